@@ -1,1 +1,1 @@
-"""The one authority over motion: grants, what needs one, and how axes are stopped."""
+"""The motion authority: grants, motion classes of parameters, envelopes, and writes that stop."""

@@ -1,4 +1,4 @@
-"""Where that can be done which a parameter table may not do: the page, and the route."""
+"""Page and route through which an object is written that a parameter table must not write."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _DRIVE = "/api/v1/drives/{drive_id}"
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """``page`` is the page's name, empty where only a script can do it with ``route``; ``how`` says
-    what to do there."""
+    """Page and route for one object. ``page`` is the page's name, empty where only a script can do
+    it with ``route``; ``how`` is the instruction for that page."""
 
     page: Page
     route: str
@@ -45,12 +45,12 @@ _SET = Alternative(
     f"PUT {_DRIVE}/motion-settings/{{key}}",
     text("motion.door-set"),
 )
-#: Roles that are the power state; every other role that energises is a setpoint.
+#: Roles that change the power state; every other role that energises the motor is a setpoint.
 _POWER_ROLES = frozenset({"control_word", "mode"})
 
 
 def alternative_of(profile: Profile, parameter: Parameter) -> Alternative:
-    """Where this object, which can put energy into the motor, is written in order."""
+    """Return the page and route for writing this object, which can put energy into the motor."""
     key = parameter.key
     for signal in profile.signals:
         if signal.key == key:
@@ -73,7 +73,7 @@ def alternative_of(profile: Profile, parameter: Parameter) -> Alternative:
 
 
 def refused(drive: str, profile: Profile, parameter: Parameter) -> NotGranted:
-    """The refusal to write this object without a grant, with where it can be done."""
+    """Return the error for a write of this object without a grant, naming the page and route."""
     door = alternative_of(profile, parameter)
     error = NotGranted(
         "motion.put-energy-motor-not",

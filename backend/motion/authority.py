@@ -1,7 +1,7 @@
-"""Who may move which axis now. Everything that can put energy into a motor asks here.
+"""Issues and checks the permission to move an axis: whatever can energise a motor needs a grant.
 
-A grant is held by the work that asked for it: the task, and the tasks that it starts, such as
-cleanups. A route that runs next to a motion of the same axis does not hold the motion's grant.
+A grant is held by the asyncio task that requested it and by the tasks that this task starts, such
+as cleanups. A route that runs at the same time as a motion of the axis does not hold its grant.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from backend.people.identity import acting_person, acting_session
 from drivers.errors import Busy
 from drivers.texts.message import Text, text
 
-#: No motion is permitted for longer than this without being asked for again.
+#: Default duration of a grant, s. A longer motion needs a new request.
 LONGEST_S = 4 * 3600.0
-#: An axis that was left enabled through no page loses its power after this time.
+#: Time after which an axis loses its power that was left enabled without a page, s.
 UNATTENDED_S = 600.0
 
-#: Called with the reason when a grant ends before the work that holds it: its time is over, or
-#: whoever asked for it may move nothing any more.
+#: Called with the reason when a grant ends before the work that holds it: its time has expired, or
+#: the person who requested it may no longer move any axis.
 Ended = Callable[[Text], None]
 
 _TIME_OVER = text("motion.time-is-over")
@@ -36,7 +36,7 @@ _held: ContextVar[tuple[Grant, ...]] = ContextVar("grants", default=())
 
 @dataclass(slots=True, eq=False)
 class _Record:
-    """A grant that was issued and is not given back. ``why`` it ended, None while it is live."""
+    """A grant that was issued and not yet returned. ``why`` it ended; None while it is live."""
 
     grant: Grant
     ended: Ended | None
@@ -45,7 +45,7 @@ class _Record:
 
 
 class MotionAuthority:
-    """Issues the grants of the axes of one bench, or of one drive outside a server."""
+    """Issues the grants for all axes of one bench, or for one drive outside a server."""
 
     def __init__(self) -> None:
         self._records: dict[str, list[_Record]] = {}
@@ -58,21 +58,21 @@ class MotionAuthority:
     # --- who may move -------------------------------------------------------------------
 
     def grant_of(self, drive: str) -> Grant | None:
-        """The grant by which this axis may move now, the innermost one; None where none is live."""
+        """Return the innermost live grant of this axis; None where there is none."""
         live = self._live(drive)
         whole = [grant for grant in live if grant.keys is None]
         return (whole or live)[-1] if live else None
 
     def mover_of(self, drive: str) -> Grant | None:
-        """The live grant of a motion that goes on.
+        """Return the live grant of the motion in progress; None where there is none.
 
-        An axis that is only left enabled has none, nor one of which terminals are overruled.
+        An axis that is only left enabled, or whose terminals are only forced, has no such grant.
         """
         live = [g for g in self._live(drive) if not g.standing and g.keys is None]
         return live[-1] if live else None
 
     def drives_of(self, session: str) -> set[str]:
-        """Axes of which this session, token or invitation has a live grant, of whatever kind."""
+        """Return the axes of which this session, token or invitation has any live grant."""
         if not session:
             return set()
         return {
@@ -82,9 +82,10 @@ class MotionAuthority:
         }
 
     def held(self, drive: str, key: str | None = None) -> Grant | None:
-        """The grant of this axis that the calling work holds; also one that was ended meanwhile.
+        """Return the grant of this axis that the calling work holds, even if it has ended
+        meanwhile.
 
-        With ``key`` only one that covers this object.
+        With ``key``: only a grant that covers this object.
         """
         known = {record.grant for record in self._records.get(drive, ())}
         for grant in reversed(_held.get()):
@@ -93,12 +94,12 @@ class MotionAuthority:
         return None
 
     def outermost(self, drive: str) -> Grant | None:
-        """The first grant of this axis that the calling work holds: that of the whole motion."""
+        """Return the first grant of this axis that the calling work holds: the whole motion's."""
         known = {record.grant for record in self._records.get(drive, ())}
         return next((grant for grant in _held.get() if grant in known), None)
 
     def require_held(self, drive: str, name: str, key: str | None = None) -> Grant:
-        """Like `held`.
+        """Return the grant as `held` does, or raise.
 
         Raises:
             NotGranted: the calling work holds none.
@@ -109,19 +110,19 @@ class MotionAuthority:
         return grant
 
     def may_move(self, drive: str) -> bool:
-        """Whether the calling work holds a grant of this axis that is live."""
+        """Whether the calling work holds a live grant of this axis."""
         grant = self.held(drive)
         return grant is not None and self._ended(grant) is None
 
     def require(
         self, grant: Grant, drive: str, name: str, key: str, *, restores: bool = False
     ) -> None:
-        """This grant permits to write this object of this drive now.
+        """Check that this grant permits writing this object of this drive now.
 
-        One that has ended still lets the work restore what it had changed (``restores``).
+        A grant that has ended still permits restoring changed values (``restores``).
 
         Raises:
-            NotGranted: it is of another drive or object, or it has ended.
+            NotGranted: the grant is for another drive or object, or it has ended.
         """
         record = self._record(grant)
         if grant.drive != drive or record is None or not grant.covers(key):
@@ -150,14 +151,15 @@ class MotionAuthority:
         lasts_s: float = LONGEST_S,
         ended: Ended | None = None,
     ) -> Iterator[Grant]:
-        """A grant for the length of the block, held by the calling work.
+        """Issue a grant for the duration of the block, held by the calling work.
 
-        Inside another one of the same work it ends with that at the latest. ``ended`` is called
-        when its time is over before the block ends; the work must then bring its axis to rest.
+        Inside another grant of the same work, it ends no later than that one. ``ended`` is called
+        when the grant ends before the block does; the work must then bring its axis to standstill.
 
         Raises:
             Busy: other work has a grant for this axis.
-            NotGranted: the calling work holds a grant of it that has ended, by STOP or otherwise.
+            NotGranted: the grant of this axis that the calling work holds has ended, by STOP or
+                otherwise.
         """
         grant = self._issue(drive, name, purpose, envelope, keys, lasts_s, ended)
         _held.set((*_held.get(), grant))
@@ -168,7 +170,7 @@ class MotionAuthority:
             self.end(grant)
 
     def standing(self, drive: str, purpose: str | Text, *, lasts_s: float, ended: Ended) -> Grant:
-        """A grant for an axis that is left enabled, until `end`; it takes the place of an older."""
+        """Issue a grant for an axis left enabled, valid until `end`; it replaces an earlier one."""
         for record in list(self._records.get(drive, ())):
             if record.grant.standing:
                 self.end(record.grant)
@@ -180,7 +182,7 @@ class MotionAuthority:
         return grant
 
     def end(self, grant: Grant) -> None:
-        """Give a grant back. Nothing is commanded to the work that had it."""
+        """Return a grant. The work that held it receives no command."""
         record = self._record(grant)
         if record is None:
             return
@@ -192,18 +194,19 @@ class MotionAuthority:
         self._changed(grant.drive)
 
     def revoke(self, drive: str, why: Text) -> None:
-        """All grants of this axis end now, whoever holds them: nothing is commanded any more.
+        """End all grants of this axis now, whoever holds them, so that no further setpoint is
+        accepted.
 
-        Their holders are not reported: whoever calls this brings the axis to rest.
+        The holders are not notified: the caller brings the axis to standstill.
         """
         for record in self._records.get(drive, ()):
             record.why = record.why or why
         self._changed(drive)
 
     def end_of(self, session: str, why: Text) -> None:
-        """All grants asked for by this session, token or invitation end now, on every axis.
+        """End all grants requested by this session, token or invitation now, on every axis.
 
-        Their holders are informed as when the time of a grant is over: each stops its axis.
+        The holders are notified as when a grant expires: each stops its axis.
         """
         if not session:
             return  # the one user of a station without accounts, or the program itself
@@ -212,9 +215,9 @@ class MotionAuthority:
                 self._expire(record, why)
 
     def end_motion(self, drive: str, why: Text) -> bool:
-        """End the grants by which this axis is moved, and inform their holders.
+        """End the grants by which this axis is moved, and notify their holders.
 
-        An axis that is only left enabled keeps its grant. False where no grant moves it.
+        An axis that is only left enabled keeps its grant. Returns False where no grant moves it.
         """
         moving = [
             r for r in list(self._records.get(drive, ())) if not r.grant.standing and not r.why
@@ -243,7 +246,7 @@ class MotionAuthority:
     ) -> Grant:
         outer = self.held(drive)
         if outer is not None and (why := self._ended(outer)) is not None:
-            # Work that STOP has ended does not get back what was removed.
+            # Work that STOP has ended must not obtain a new grant.
             raise NotGranted(
                 "motion.permission-move-ended", drive=name, purpose=outer.purpose, why=why
             )
@@ -253,7 +256,7 @@ class MotionAuthority:
                 continue
             apart = keys is not None and other.keys is not None and not keys & other.keys
             if keys is None and other.keys is not None:
-                continue  # overruled terminals go with a motion
+                continue  # forced terminals may coexist with a motion
             if keys is not None and other.keys is None:
                 continue
             if not apart:
@@ -282,7 +285,7 @@ class MotionAuthority:
         return [r.grant for r in records if not r.why and now <= r.grant.until]
 
     def _ended(self, grant: Grant) -> Text | None:
-        """Why this grant is not live any more; None while it is."""
+        """Return the reason why this grant is no longer live; None while it is live."""
         record = self._record(grant)
         if record is None or time.monotonic() > grant.until:
             return _TIME_OVER if record is None else record.why or _TIME_OVER

@@ -1,4 +1,4 @@
-"""What writing an object can do to a motor, as the profile says it."""
+"""Motion class of an object: the effect that writing it can have on a motor, from the profile."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ MotionClass = Literal["none", "at_enable", "energises"]
 
 
 def motion_of(parameter: Parameter) -> MotionClass:
-    """The motion class. What can be written and has none is treated as the worst."""
+    """Return the motion class. A writable object without one counts as ``energises``, the worst."""
     if parameter.access == "ro":
         return "none"
     return parameter.motion or "energises"
 
 
 def held_still(parameter: Parameter) -> bool:
-    """Whether it is written only while the motor has no power and nothing moves the axis."""
+    """Whether the object may be written only without motor power and with nothing
+    moving the axis.
+    """
     return motion_of(parameter) == "at_enable" and not parameter.safe_in_motion

@@ -1,4 +1,4 @@
-"""Within what a motion must stay."""
+"""Limits that one motion must not exceed."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from backend.motion.travel_unit import TravelUnit
 
 @dataclass(frozen=True, slots=True)
 class Envelope:
-    """Limits of one motion, in the axis' units: travel from the start point in rev, rpm, %, s.
+    """Limits of one motion: travel from the start point [rev], speed [rpm], torque [%], time [s].
 
-    ``travel_unit`` and ``travel_per_rev`` are the unit of who asked, for what is commanded to them.
+    ``travel_unit`` and ``travel_per_rev`` are the unit of the requester, used in messages to them.
     """
 
     travel_rev: float

@@ -1,4 +1,4 @@
-"""The permission to put energy into a motor, as a value that is handed to whoever writes."""
+"""Permission to put energy into a motor, a value that is passed to the code that writes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from drivers.texts.message import Text
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grant:
-    """Who may move one axis, what for, until when and within what envelope.
+    """Permission for one motion: person, axis, purpose, time limit and envelope.
 
-    Only `backend.motion.authority.MotionAuthority` issues grants that count: one that was made by
-    hand is not live, however it looks. Two grants are the same only if they are one object.
+    Only grants issued by `backend.motion.authority.MotionAuthority` are live; one constructed
+    elsewhere is not. Two grants are equal only if they are the same object.
 
     ``drive`` is the drive's id. ``actor`` is the person, empty where the program acts by itself.
-    ``until`` is in `time.monotonic` seconds, infinite where the end comes from elsewhere: the job
+    ``until`` is in `time.monotonic` seconds, infinite where something else ends the grant: the job
     that holds it, the page, the control lease. ``envelope`` is None where none is known yet, or
-    where nothing is moved (enabling, a procedure). ``keys`` limits it to these objects; None is
-    the whole axis. ``standing``: the axis was left enabled by a person; it bounds no other grant.
-    ``session`` names the log-in, token or invitation by which the person asked; it ends with that.
+    where nothing is moved (enabling, a procedure). ``keys`` limits the grant to these objects; None
+    means the whole axis. ``standing``: a person left the axis enabled; such a grant bounds no
+    other. ``session`` is the log-in, token or invitation by which the person asked; the grant ends
+    with it.
     """
 
     drive: str
@@ -34,12 +35,12 @@ class Grant:
     session: str = ""
 
     def covers(self, key: str) -> bool:
-        """Whether this object may be written with it."""
+        """Whether the grant permits writing this object."""
         return self.keys is None or key in self.keys
 
 
 class NotGranted(NotAllowed):
-    """Something that can put energy into a motor, without a grant of the motion authority.
+    """Raised when something could put energy into a motor without a grant of the motion authority.
 
     ``page`` and ``route`` are where it can be done (`backend.motion.alternatives`), or empty.
     """

@@ -1,4 +1,4 @@
-"""Which writes only take energy out of a motor, so that they need no grant."""
+"""Writes that can only remove energy from a motor and therefore need no grant."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from profiles.schema import Parameter, Profile, Raw
 #: Bit 3 of the control word: without it the motor has no power (CiA 402-2 table 29). The family
 #: whose status word echoes the control word uses the same words (003:279).
 _ENABLE_OPERATION_BIT = 0x08
-#: Bits that a word without that bit may have: the first three, fault reset and halt.
+#: Bits allowed in a word without that bit: the first three, fault reset, halt, change immediately.
 _HARMLESS = 0x07 | FAULT_RESET | HALT | CHANGE_IMMEDIATELY
-#: For these zero is a place or a mode, not an end of motion.
+#: For these roles zero is a position or a mode, not the end of a motion.
 _ZERO_MOVES = frozenset({"position_target", "position_offset", "mode", "home_offset"})
 
 
 def stops(profile: Profile, parameter: Parameter, raw: Raw) -> bool:
-    """Whether this raw value can only end motion or take power away.
+    """Whether this raw value can only end motion or remove power.
 
-    Control words that do not enable; and zero for a speed, a torque, an overruled terminal or a
-    trigger of the drive's own, which are all off with it.
+    True for a control word that does not enable operation, and for zero written to a speed, a
+    torque, a forced terminal or a trigger of the drive's own motion, which zero switches off.
     """
     roles = {signal.role for signal in profile.signals if signal.key == parameter.key}
     if "control_word" in roles:

@@ -1,4 +1,4 @@
-"""Whether an axis moves, by 606Ch and by differences of 6064h; neither is trusted alone."""
+"""Detects whether an axis moves, from 606Ch and from differences of 6064h; both must agree."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
 
-#: Slower than this by both: standing. A 606Ch without a filter shows some rpm of noise at
-#: standstill.
+#: Standstill limits, rpm: both speeds must be below theirs. An unfiltered 606Ch shows some rpm of
+#: noise at standstill.
 STANDS_BY_POSITION_RPM = 3.0
 STANDS_BY_SPEED_RPM = 6.0
-#: Where the increments per revolution are not known: increments in a window, raw speed.
+#: Limits where the increments per revolution are unknown: increments per window, raw speed.
 _STILL_INC, _STILL_RAW = 20, 2000
-#: Differences of the position are calculated over this time at least.
+#: Shortest interval over which a position difference is taken, s.
 WINDOW_S = 0.05
-#: An axis is at standstill when it has stood for this long: one that turns round stands for a
-#: moment.
+#: Time for which an axis must stay below the limits to count as standstill, s: an axis that
+#: reverses is below them for a moment.
 DWELL_S = 0.15
-#: Process data older than this say nothing of the present.
+#: Process data older than this, s, do not represent the present state.
 _NEWEST_S = 0.05
-#: One look may take this long; a serial line asks several drives in turn.
+#: Time allowed for one sample, s; on a serial line several drives are polled in turn.
 LOOK_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """One look at an axis: monotonic time, raw position and speed (None: not reported)."""
+    """One sample of an axis: monotonic time, raw position and speed (None: not reported)."""
 
     at_s: float
     state: State
@@ -41,7 +41,7 @@ class Sample:
 
 
 class SpeedWatch:
-    """Speed of one axis from one look to the next."""
+    """Tracks the speed of one axis over successive samples."""
 
     def __init__(self, axis: Axis, units: AxisUnits | None) -> None:
         self._axis = axis
@@ -53,12 +53,12 @@ class SpeedWatch:
 
     @property
     def certain(self) -> bool:
-        """The increments per revolution are known, so that speeds are in rpm."""
+        """Whether the increments per revolution are known, so that speeds are in rpm."""
         return self.units is not None and self.units.counts_per_rev is not None
 
     @property
     def newest(self) -> Sample | None:
-        """The last look."""
+        """The last sample."""
         return self._samples[-1] if self._samples else None
 
     async def look(self) -> Sample:
@@ -85,7 +85,8 @@ class SpeedWatch:
             reported = drive.take(session.newest(drive, keys, _NEWEST_S))
         missing = [key for key in keys if key not in reported]
         if len(missing) > 1 or drive.require("status_word") in missing:
-            # A drive whose mailbox is mute is not asked for what the process data show already.
+            # Do not query a drive whose mailbox does not answer for values the process data already
+            # contain.
             reported |= await drive.read_many(missing)
         readings = (reported.get(drive.key(role) or "") for role in roles)
         word, position, velocity = (None if r is None else r.integer for r in readings)
@@ -95,7 +96,7 @@ class SpeedWatch:
         return Sample(time.monotonic(), drive.decode_state(word), position, velocity)
 
     def take(self, sample: Sample) -> None:
-        """Count a sample in."""
+        """Add a sample."""
         before = self.newest
         if before is not None and sample.position is not None and before.position is not None:
             self.travelled_inc += abs(_difference(sample.position, before.position))
@@ -108,14 +109,15 @@ class SpeedWatch:
 
     @property
     def turns(self) -> bool:
-        """The last look showed motion, or nothing certain."""
+        """Whether the last sample showed motion, or was not sufficient to exclude it."""
         return self._still_since is None
 
     def stayed_since(self, before: Sample) -> bool:
-        """Whether the last look found the position of then, within the travel of a standing axis.
+        """Whether the last position equals that of ``before``, within the tolerance of a
+        standstill.
 
-        Of looks that lie far apart the speed between them says little: an axis that swings, or
-        has just begun to move, is near its old place too.
+        For samples far apart this is weak evidence: an axis that oscillates, or has just begun to
+        move, is near its old position too.
         """
         now = self.newest
         if now is None or now.position is None or before.position is None:
@@ -125,7 +127,7 @@ class SpeedWatch:
         return abs(_difference(now.position, before.position)) <= most
 
     def stands(self, dwell_s: float = DWELL_S) -> bool:
-        """Both have said so for this long."""
+        """Whether both speeds have been below their limits for this time."""
         now = self.newest
         return (
             now is not None
@@ -134,7 +136,7 @@ class SpeedWatch:
         )
 
     def speed(self) -> float | None:
-        """Magnitude in the axis' unit: the greater of the two."""
+        """Return the magnitude of the speed in the axis' unit: the greater of both measurements."""
         now = self.newest
         if now is None:
             return None
@@ -142,12 +144,12 @@ class SpeedWatch:
         return max((value for value in both if value is not None), default=None)
 
     def slows(self, over_s: float = 0.25) -> bool:
-        """Whether it is slower now than it was then, by more than its noise."""
+        """Whether the speed now is lower than ``over_s`` ago, by more than its noise."""
         pair = self._then_and_now(over_s)
         return pair is not None and pair[1] < pair[0] * 0.995 - 0.2
 
     def time_to_standstill_s(self, over_s: float = 0.25) -> float:
-        """Time to rest, should it go on to slow down as it does; infinite where it does not."""
+        """Return the time to standstill [s] at the present deceleration; infinity if none."""
         pair = self._then_and_now(over_s)
         if pair is None or not self.slows(over_s):
             return math.inf
@@ -170,7 +172,7 @@ class SpeedWatch:
     def _moves(self, sample: Sample) -> bool:
         by_position, by_velocity = self._by_position(sample), self._by_velocity(sample)
         if by_position is None and sample.position is not None:
-            return True  # not known before two looks
+            return True  # no speed before the second sample
         if not self.certain:
             moved = self._moved(sample)
             return moved is None or abs(moved) > _STILL_INC or (by_velocity or 0.0) > _STILL_RAW
@@ -188,7 +190,7 @@ class SpeedWatch:
         return next((s for s in reversed(self._samples) if sample.at_s - s.at_s >= WINDOW_S), None)
 
     def _by_position(self, sample: Sample) -> float | None:
-        """Magnitude in rpm, or increments per second where nothing better is known."""
+        """Return the magnitude in rpm, or in increments/s if the resolution is unknown."""
         earlier, moved = self._earlier(sample), self._moved(sample)
         if earlier is None or moved is None:
             return None
@@ -205,12 +207,12 @@ class SpeedWatch:
 
 
 def _difference(new: int, old: int) -> int:
-    """Of positions of 32 bits, which begin again at the end of their range."""
+    """Difference of two 32-bit positions, which wrap around at the end of their range."""
     return (new - old + 2**31) % 2**32 - 2**31
 
 
 async def units_of(axis: Axis) -> AxisUnits | None:
-    """Units as known; asked for where they are not, None where the drive does not report."""
+    """Return the known units, else read them; None where the drive does not answer."""
     known = axis.known_units
     if known is not None:
         return known

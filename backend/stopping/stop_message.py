@@ -1,4 +1,4 @@
-"""What STOP reached, as messages for the log and for programs that show no verdicts."""
+"""The result of STOP as messages for the log and for clients that do not show verdicts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from drivers.texts.message import Text, text
 
 
 def stop_message(name: str, found: AxisStop) -> Text | None:
-    """What became of this axis and what to do; None for an axis that stands."""
+    """Return the result for this axis and what to do; None for an axis at standstill."""
     # Without a measured speed the texts leave it out.
     speed = "none" if found.speed is None else f"{found.speed:.4g}"
     match found.verdict:

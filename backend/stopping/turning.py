@@ -1,4 +1,4 @@
-"""An axis that turns although nobody may move it, as the monitor's own readings show it."""
+"""Detects an axis that turns without permission, from the readings that the monitor polls."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from backend.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.texts.message import Text, text
 
-#: Slower is noise, or a shaft that is held and trembles.
+#: Lower speeds [rpm] are noise, or tremor of a shaft that is held.
 TURNS_RPM = 8.0
-#: How long it must turn (the end of a permitted ramp counts as none), and the latest report.
+#: Time for which the axis must turn before it is reported, s.
 _FOR_S = 0.35
-#: After the last reason to turn: a ramp ends meanwhile.
+#: Time after the last permitted motion during which turning is not reported: a ramp may end, s.
 _GRACE_S = 0.5
-#: Readings older than this say nothing of the speed now.
+#: Readings older than this, s, do not represent the present speed.
 _OLDEST_S = 2.5
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
 
 class TurnKind(StrEnum):
-    """With or without power."""
+    """Whether the axis turns without power (disabled), or with power but without a grant."""
 
     DISABLED = "disabled"
     WITHOUT_GRANT = "without_grant"
@@ -32,7 +32,7 @@ class TurnKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Turning:
-    """``speed`` in ``unit``, magnitude."""
+    """An axis that turns without permission. ``speed`` in ``unit``, magnitude."""
 
     kind: TurnKind
     speed: float
@@ -40,7 +40,7 @@ class Turning:
 
 
 class TurnWatch:
-    """Judges one axis from one poll to the next."""
+    """Detects unpermitted turning of one axis over successive polls."""
 
     def __init__(self, may_turn: Callable[[], bool]) -> None:
         self._may_turn = may_turn
@@ -51,7 +51,7 @@ class TurnWatch:
     def take(
         self, units: AxisUnits, state: State, position: int | None, velocity: int | None
     ) -> Turning | None:
-        """One more reading; None at standstill, or where it may turn."""
+        """Evaluate one more reading; None at standstill, or where the axis may turn."""
         now = time.monotonic()
         by_position = self._by_position(units, now, position)
         by_velocity = None if velocity is None else abs(units.velocity(velocity))
@@ -66,7 +66,7 @@ class TurnWatch:
             return None
         if self._since_s is None:
             self._since_s = now
-        # A shaft that went on between two looks a long time apart has turned all that time.
+        # A shaft that moved between two samples far apart counts as turning for the whole interval.
         turned_s = now - self._since_s
         if by_position is not None and by_position >= TURNS_RPM and len(self._seen) > 1:
             turned_s = max(turned_s, now - self._seen[-2][0])
@@ -92,7 +92,7 @@ class TurnWatch:
 
 
 def turning_message(name: str, turning: Turning) -> Text:
-    """For the log."""
+    """Return the message for the log."""
     powered = turning.kind is not TurnKind.DISABLED
     return text(
         "stopping.turns-with-power" if powered else "stopping.turns-without-power",

@@ -1,10 +1,11 @@
-"""Watches one axis from STOP to standstill, and does more where the quick stop is not enough.
+"""Supervises one axis from STOP to standstill, and escalates where the quick stop is insufficient.
 
-The first quick-stop word is out when this begins. What follows, each as a `StopStep`: where the
-axis turns without being enabled, what the drive moves by itself is undone (`stop_clears` of
-its profile); where an enabled axis neither stands nor slows down when its ramp should be over, its
-power goes, the brake first where the bus rules it; and at last the process data end, so that the
-drive's watchdog trips. An axis that slows down on a long ramp keeps its power: to coast is worse.
+The first quick-stop word has been sent before this begins. The further steps, each recorded as a
+`StopStep`: where the axis turns without being enabled, the drive's own motion triggers are cleared
+(`stop_clears` of its profile); where an enabled axis is neither at standstill nor decelerating when
+its ramp should be over, its power is removed, after applying the brake where the bus controls it;
+finally the process data are ended, so that the drive's watchdog trips. An axis that decelerates on
+a long ramp keeps its power, because coasting is worse.
 """
 
 from __future__ import annotations
@@ -30,31 +31,32 @@ from drivers.errors import DriveError, LinkLost, LinkTimeout
 from drivers.texts.message import Text, text
 from profiles.stopping import StopClear
 
-#: The ramp's own time gets this much more, and is at least and at most so long.
+#: Ramp time: multiplied by the factor, plus the lag [s], limited to the shortest and longest [s].
 _MORE, _LAG_S, SHORTEST_S, LONGEST_S = 1.3, 0.25, 0.4, 3.0
-#: An axis that still slows down is waited for until then.
+#: Time after STOP until which an axis that still decelerates is waited for, s.
 _PATIENCE_S = 8.0
-#: An axis without power that will stand so soon is waited for, too.
+#: An axis without power is also waited for if its predicted time to standstill is below this, s.
 _SOON_S = 1.0
-#: How long a further step has to act.
+#: Time allowed for a further step to take effect, s.
 _STEP_S = 0.5
-#: What the drive moves by itself ends by the drive's own ramp.
+#: Time allowed for the drive's own ramp after its own motion was ended, s.
 _OWN_RAMP_S = 1.0
 _LOOK_EVERY_S = 0.02
-#: Turning without being enabled for this long is not the end of a quick stop.
+#: Time of turning without power after which it is no longer the end of a quick stop, s.
 _UNPOWERED_S = 0.1
-#: Slower than this part of the speed within that time: it stops. Faster: it falls.
+#: Ratio of the speed to that at the start of that time: below the first the axis decelerates,
+#: above the second it falls.
 _RUNS_OUT, _FALLS = 0.95, 1.05
-#: A drive that reports nothing for this long is not reached.
+#: A drive that does not answer for this time counts as unreachable, s.
 _SILENT_S = 1.5
-#: A position that was read within this time before STOP shows whether the axis stood; a younger one
-#: than `WINDOW_S` is too young for a speed, and is let grow old enough.
+#: A position read within this time before STOP shows whether the axis was at standstill, s. One
+#: more recent than `WINDOW_S` is too recent for a speed, so the watch waits before it samples.
 _BEFORE_S = 5.0
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION, State.UNKNOWN)
 
 
 class StopWatch:
-    """One STOP of one axis."""
+    """Supervision of one STOP of one axis."""
 
     def __init__(
         self, axis: Axis, end_process_data: Callable[[], Awaitable[bool]] | None = None
@@ -70,7 +72,7 @@ class StopWatch:
         self._until_s = 0.0
 
     async def run(self, problem: Text | None = None) -> AxisStop:
-        """Until the verdict. ``problem`` states why the first word did not go out."""
+        """Run until there is a verdict. ``problem``: why the first quick-stop word was not sent."""
         axis, self._began_s = self._axis, time.monotonic()
         before = self._resting_at()
         try:
@@ -92,7 +94,7 @@ class StopWatch:
         return await self._follow(problem)
 
     async def _read_ramp(self) -> None:
-        """What was not read before the motion is asked for now, the word being out."""
+        """Read the ramp settings not read before the motion; the stop word has been sent."""
         axis = self._axis
         if known_settings(axis.drive).ramp_raw() is None:
             try:
@@ -102,7 +104,7 @@ class StopWatch:
                 return
 
     def _resting_at(self) -> Sample | None:
-        """What was read before STOP, of an axis that had no power then."""
+        """Return the reading from shortly before STOP, if the axis had no power then."""
         drive = self._axis.drive
         position, status = (
             drive.readings.get(drive.key(role) or "") for role in ("position_actual", "status_word")
@@ -117,7 +119,7 @@ class StopWatch:
         return Sample(time.monotonic() - ago_s, state, position.raw, None)
 
     def _stood(self, before: Sample, now: Sample) -> bool:
-        """It had no power and stood before STOP, and does so now: no need to look for longer."""
+        """Whether the axis was without power and at standstill before STOP, and still is."""
         if now.state in _POWERED:
             return False
         self._watch.take(replace(before, velocity=now.velocity))
@@ -125,7 +127,7 @@ class StopWatch:
         return self._watch.stands(0.0) and self._watch.stayed_since(before)
 
     async def _stands_still(self, before: Sample) -> bool:
-        """A second look: what turns round has no speed for a moment, near its old place or not."""
+        """Confirm with a second sample: an axis at a reversal has zero speed for a moment."""
         await asyncio.sleep(_LOOK_EVERY_S)
         sample = await self._watch.look()
         return (
@@ -135,7 +137,7 @@ class StopWatch:
         )
 
     async def _silent(self, problem: Text) -> AxisStop:
-        """The first look failed: another within the time, then it is not reached."""
+        """Retry after a failed first sample; unreachable after `_SILENT_S` without answer."""
         while time.monotonic() - self._began_s < _SILENT_S:
             await asyncio.sleep(_LOOK_EVERY_S)
             try:
@@ -175,7 +177,7 @@ class StopWatch:
                 return self._moving(sample, problem)
 
     def _allowed_s(self) -> float | None:
-        """Time that the ramp in force takes from the speed that is measured."""
+        """Return the time [s] of the active ramp from the measured speed; None if unknown."""
         watch = self._watch
         speed = watch.speed()
         if speed is None or not watch.certain or watch.units is None:
@@ -186,30 +188,32 @@ class StopWatch:
         return min(max(speed / ramp * _MORE + _LAG_S, SHORTEST_S), LONGEST_S)
 
     async def _without_power(self, sample: Sample) -> None:
-        """An axis that turns although it is not enabled: what the drive does by itself is ended."""
+        """Clear the drive's own motion triggers for an axis that turns without power."""
         now, speed = time.monotonic(), self._watch.speed() or 0.0
         if sample.state in (*_POWERED, State.FAULT) or not self._watch.turns:
             self._unpowered_since = None
             return
         if self._unpowered_since is None or speed < self._unpowered_speed * _RUNS_OUT:
-            # The rest of a ramp, or a load that swings: what moves by itself keeps its speed.
+            # The rest of a ramp, or an oscillating load: motion driven by the drive keeps its
+            # speed.
             self._unpowered_since, self._unpowered_speed = now, speed
         if self._cleared or now - self._unpowered_since < _UNPOWERED_S:
             return
         self._cleared = True
-        # A holding brake is no stopping device: it is for an axis that falls, not one that coasts.
+        # A holding brake must not be used for stopping: apply it to a falling axis, not a coasting
+        # one.
         await self._clear(brake=speed > self._unpowered_speed * _FALLS)
         self._until_s = max(self._until_s, time.monotonic() + _OWN_RAMP_S)
 
     async def _next(self, sample: Sample) -> bool:
-        """The time is over: wait on, or do the next thing. False where nothing is left."""
+        """Wait on or take the next step after the time has expired. False where no step is left."""
         now, slows = time.monotonic(), self._watch.slows()
         soon = self._watch.time_to_standstill_s() < _SOON_S
         if slows and (sample.state in _POWERED or soon) and now - self._began_s < _PATIENCE_S:
             self._until_s = now + _STEP_S / 2
             return True
         if slows and (self._cleared or sample.state is State.FAULT):
-            return False  # it coasts, or ends by its own ramp: nothing brakes it more
+            return False  # it coasts, or ends by its own ramp: no step brakes it harder
         if not self._disabled and sample.state in _POWERED:
             self._disabled = True
             await self._clear(triggers=False)
@@ -244,7 +248,7 @@ class StopWatch:
             await axis.control(cia402.DISABLE_VOLTAGE)
 
     async def _trip_watchdog(self) -> bool:
-        """Whether there were process data to end."""
+        """End the process data; False where there are none to end."""
         if self._end_process_data is None:
             return False
         problem: Text | None = None
@@ -257,14 +261,14 @@ class StopWatch:
         return True
 
     async def _clear(self, *, brake: bool = True, triggers: bool = True) -> None:
-        """Write the neutral values of what the drive moves by itself, and apply the brake."""
+        """Write the neutral values of the drive's own motion triggers, and apply the brake."""
         for entry in self._axis.drive.profile.stop_clears:
             wanted = brake if entry.kind == "brake" else triggers
             if wanted and not await self._clear_one(entry):
                 return
 
     async def _clear_one(self, entry: StopClear) -> bool:
-        """Whether the drive answers."""
+        """Write one neutral value; False where the drive does not answer."""
         axis, drive, answers = self._axis, self._axis.drive, True
         problem: Text | None = None
         if drive.unreachable_why(drive.parameter(entry.key)):
@@ -287,7 +291,7 @@ class StopWatch:
         return answers
 
     async def _settle(self, sample: Sample) -> None:
-        """It stands: 605Ah as it was, and no power where it was only halted."""
+        """At standstill: restore 605Ah, and quick-stop an axis that was only halted."""
         axis, before = self._axis, self._axis.option_before
         halted = any(step.code is StepCode.HALT for step in axis.stop_steps)
         try:

@@ -1,1 +1,1 @@
-"""Two mechanically coupled axes: their 2×2 response, its modes, and the stability of both loops."""
+"""Two mechanically coupled axes: 2×2 response, its modes, and the stability of both loops."""

@@ -1,9 +1,9 @@
-"""Two experiments that show a 2×2 response: the same multisine on both axes, the second time with
-the sign of axis 2 turned.
+"""Two experiments that determine a 2×2 response: the same multisine on both axes, the second time
+with the sign of axis 2 reversed.
 
 The signs are the rows of a Hadamard matrix of order 2: both axes are excited at full amplitude all
-the time, and every line is excited in both experiments. Lines that are divided between the axes
-would take one experiment instead of two, and show each entry at every other line only; the lightly
+the time, and every line is excited in both experiments. Dividing the lines between the axes would
+take one experiment instead of two, but determine each entry at every other line only; the lightly
 damped skew mode of a gantry then lies between two lines of its own entry. Source: Pintelon &
 Schoukens, *System Identification: A Frequency Domain Approach* (2012), section 2.7.
 """
@@ -38,9 +38,9 @@ def orthogonal_multisines(
     amplitude: FloatArray | None = None,
     ramp_samples: int | None = None,
 ) -> tuple[Experiment, ...]:
-    """Pairs of experiments with common phases, one pair for each realisation.
+    """Return pairs of experiments with the same phases, one pair for each realisation.
 
-    Every signal is a speed: its integral ends where it began.
+    Every signal is a speed setpoint whose integral ends where it began.
 
     Raises:
         ValueError: as `multisine`.

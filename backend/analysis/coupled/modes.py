@@ -1,15 +1,15 @@
 """Common and differential motion of two coupled axes, and the modes of both.
 
-Common: mean speed of both axes by the sum of their torques. Differential: speed of axis 1 less that
-of axis 2 by half the difference of their torques. Torque times speed is the same in both pairs of
-coordinates, so that inertias and stiffnesses are those of a machine in them.
+Common: mean speed of both axes, driven by the sum of their torques. Differential: speed of axis 1
+minus that of axis 2, driven by half the difference of their torques. Torque times speed is the same
+in both pairs of coordinates, so inertias and stiffnesses keep their mechanical meaning.
 
 The modes are those of a reciprocal mechanical system,
 G(s) = e^(-sτ) [R₀/(s + a) + R₁/(s + b) + Σ (Rᵢs + Qᵢωᵢ) / (s² + 2ζᵢωᵢs + ωᵢ²) + s E]
-with real symmetric 2×2 matrices (Ewins, *Modal Testing*, 2nd ed. 2000, sections 2.4 and 2.6; Qᵢ is
-there where damping is not proportional, R₁ where the beam turns freely, E stands for the modes
-above the band). Given the poles, the matrices are a linear regression; the poles are searched for
-(variable projection, Golub & Pereyra 1973).
+with real symmetric 2×2 matrices (Ewins, *Modal Testing*, 2nd ed. 2000, sections 2.4 and 2.6). Qᵢ
+represents non-proportional damping, R₁ a beam that turns freely, E the modes above the band. Given
+the poles, the matrices are a linear regression; the poles are searched for (variable projection,
+Golub & Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
 from backend.analysis.thresholds import coupled_modes as threshold
 
 _TURN = 2.0 * np.pi
-#: Columns 11, 12, 21, 22 of a symmetric matrix by its entries 11, 12, 22.
+#: Maps the entries 11, 12, 22 of a symmetric matrix to its columns 11, 12, 21, 22.
 _SYMMETRIC = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 _FIRST = 3
-"""Place of the first mode among the parameters: a delay and two corners of friction come before."""
+"""Index of the first mode among the parameters, after a delay and two friction corners."""
 _RIGID = 2
-"""Functions of the rigid body before those of the modes."""
+"""Number of functions of the rigid body, which precede those of the modes."""
 _MEAN_AND_DIFFERENCE = np.array([[0.5, 0.5], [1.0, -1.0]])
 
 Kind = Literal["common", "skew"]
@@ -39,7 +39,7 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Mode:
-    """``skew_share`` is how much of its motion at the motors is differential (0 to 1), of which
+    """One mode. ``skew_share`` (0 to 1) is the differential share of its motion at the motors;
     ``kind`` is the larger part.
     """
 
@@ -53,10 +53,12 @@ class Mode:
 
 @dataclass(frozen=True)
 class CoupledModes:
-    """``inertia_kgm2`` is that of the whole machine in common motion, at one motor turning as the
-    mean of both. ``skew_stiffness_nm_per_rad`` is half the difference of the torques over the
-    difference of the positions at rest, None where the axes may differ without a torque, or where
-    it cannot be known. Intervals 95 %.
+    """Modes, inertia and skew stiffness of the pair, with 95 % intervals.
+
+    ``inertia_kgm2`` is that of the whole machine in common motion, seen at one motor that turns at
+    the mean speed of both. ``skew_stiffness_nm_per_rad`` is half the static difference of the
+    torques over the difference of the positions; None where the axes may differ without a torque,
+    or where it cannot be determined.
     """
 
     modes: tuple[Mode, ...]
@@ -65,17 +67,17 @@ class CoupledModes:
     skew_stiffness_nm_per_rad: float | None
     skew_stiffness_ci95: Interval | None
     misfit: float
-    """Mean square of the residuals over what the covariance of the lines expects, 1 at best."""
+    """Mean square of the residuals relative to the covariance of the lines, ideally 1."""
 
 
 def common_and_differential(response: CoupledResponse) -> CoupledResponse:
-    """The same response between sum of torques, half their difference; mean speed, difference."""
+    """Return the response from torque sum and half difference to mean speed and difference."""
     a = _MEAN_AND_DIFFERENCE
     return response.transformed(a, a.T)
 
 
 def find_modes(response: CoupledResponse) -> CoupledModes:
-    """The modes inside the band.
+    """Return the modes inside the band.
 
     Raises:
         ValueError: too few lines for a model.
@@ -91,7 +93,7 @@ def find_modes(response: CoupledResponse) -> CoupledModes:
             trial = fit.solved(start)
             if (least := fit.cost(trial)) < found:
                 better, found = trial, least
-        # Akaike's criterion, corrected by a factor that noise alone does not reach.
+        # Akaike's criterion, with a factor large enough that noise alone does not reach it.
         if cost - found < threshold.GAIN * fit.parameters_of_a_mode:
             break
         x, cost = better, found
@@ -100,8 +102,8 @@ def find_modes(response: CoupledResponse) -> CoupledModes:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Lines [n]; the entries as white real rows, and the factor [n, 4, 3] from the symmetric
-    entries to them.
+    """Lines [n]: whitened real rows of the entries, and the matrix [n, 4, 3] from the entries 11,
+    12 and 22 to them.
     """
 
     f: FloatArray
@@ -113,10 +115,10 @@ class _Fit:
 
     @staticmethod
     def of(response: CoupledResponse) -> _Fit:
-        """Lines of a response."""
+        """Return the fit problem for the lines of a response."""
         n = response.frequency_hz.size
         g = response.response.reshape(n, 4)
-        # A line is not known better than the model of the path is: half a degree.
+        # A line is not known better than the model of the path: half a degree.
         floor = threshold.FLOOR * np.linalg.norm(g, axis=1)
         covariance = response.covariance + (floor**2)[:, None, None] * np.eye(4)
         white = np.linalg.inv(np.linalg.cholesky(covariance))
@@ -125,7 +127,7 @@ class _Fit:
         return _Fit(response.frequency_hz, rows, white @ _SYMMETRIC, response.spread)
 
     def _columns(self, x: FloatArray) -> ComplexArray:
-        """Functions [n, m] that the symmetric matrices are factors of."""
+        """Functions [n, m] of which the symmetric matrices are the coefficients."""
         s = 2j * np.pi * self.f
         shapes = [1.0 / (s + np.exp(x[1])), 1.0 / (s + np.exp(x[2]))]
         for log_hz, log_damping in x[_FIRST:].reshape(-1, 2):
@@ -144,22 +146,22 @@ class _Fit:
         return np.concatenate([whole.real, whole.imag])
 
     def _regression(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Matrix and solution of the linear part."""
+        """Matrix and solution of the linear regression."""
         a = self._rows(self._columns(x))
         scale = np.linalg.norm(a, axis=0)
         a_scaled = a / scale
         squares = a_scaled.T @ a_scaled
-        # Functions that are nearly the same share what they explain.
+        # The ridge makes nearly identical functions share what they explain.
         squares[np.diag_indices_from(squares)] += threshold.RIDGE
         return a, np.linalg.solve(squares, a_scaled.T @ self.right) / scale
 
     def residuals(self, x: FloatArray) -> FloatArray:
-        """White residuals at these poles, the matrices being the best ones; variance 1/2 each."""
+        """Return whitened residuals at these poles with the best matrices; variance 1/2 each."""
         a, solution = self._regression(x)
         return self.right - a @ solution
 
     def _slopes(self, x: FloatArray, solution: FloatArray) -> FloatArray:
-        """What the rows change by with each of the poles, the matrices being kept."""
+        """Slopes of the rows by each pole, with the matrices kept."""
         step = 1e-5
         slopes = np.empty((self.right.size, x.size))
         for place in range(x.size):
@@ -170,19 +172,19 @@ class _Fit:
         return slopes
 
     def _jacobian(self, x: FloatArray) -> FloatArray:
-        """Of `residuals`, by Kaufman's approximation (1975): what the matrices take up is left."""
+        """Jacobian of `residuals` by Kaufman's approximation (1975), matrices projected out."""
         a, solution = self._regression(x)
         q, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
         slopes = self._slopes(x, solution)
         return np.asarray(q @ (q.T @ slopes) - slopes)
 
     def cost(self, x: FloatArray) -> float:
-        """Chi-square."""
+        """Return chi-square."""
         left = self.residuals(x)
         return 2.0 * float(left @ left)
 
     def solved(self, start: FloatArray) -> FloatArray:
-        """The poles near these that fit best."""
+        """Return the best poles near the given ones."""
         modes = (start.size - _FIRST) // 2
         low = [-threshold.DELAY_RAD, *[np.log(threshold.VISCOUS_RANGE[0])] * 2]
         high = [threshold.DELAY_RAD, *[np.log(threshold.VISCOUS_RANGE[1])] * 2]
@@ -201,7 +203,7 @@ class _Fit:
         return np.asarray(found.x)
 
     def candidates(self, x: FloatArray) -> list[FloatArray]:
-        """Where one more mode takes most of what is left, and where one that was found is two."""
+        """Return starts with one more mode: where it explains most, or splitting a known one."""
         grid = np.geomspace(1.02 * self.f[0], self.f[-1] / 1.02, threshold.PLACES)
         costs = [
             self.cost(np.concatenate([x, [np.log(hz), np.log(threshold.TRIED_DAMPING)]]))
@@ -230,7 +232,7 @@ class _Fit:
         return covariance * max(misfit, 1.0), solution, misfit
 
     def described(self, x: FloatArray) -> CoupledModes:
-        """What the model says, with intervals."""
+        """Return the modes, inertia and stiffness of the model, with intervals."""
         covariance, solution, misfit = self._covariance(x)
         matrices = solution.reshape(-1, 3)
         places = x.size + np.arange(solution.size).reshape(-1, 3)
@@ -253,7 +255,7 @@ class _Fit:
             )
         modes = [mode for mode in modes if self._shown(mode)]
         modes.sort(key=lambda mode: mode.frequency_hz)
-        # Mean of the four entries: R₀ + R₁ of common motion is 1/J of the whole machine.
+        # The mean of the four entries R₀ + R₁ of common motion is 1/J of the whole machine.
         mean = np.zeros(covariance.shape[0])
         mean[places[:_RIGID]] = (0.25, 0.5, 0.25)
         rigid = float(mean[x.size :] @ solution)
@@ -263,7 +265,7 @@ class _Fit:
         return CoupledModes(tuple(modes), 1.0 / rigid, ends, stiffness, interval, misfit)
 
     def _shown(self, mode: Mode) -> bool:
-        """Not one whose frequency may lie beyond the band, or that one line alone may have made."""
+        """False for a mode that may lie beyond the band, or that a single line may have caused."""
         low_hz, high_hz = mode.frequency_ci95_hz
         inside = self.f[0] < low_hz and high_hz < self.f[-1]
         low, high = mode.damping_ci95
@@ -276,13 +278,13 @@ class _Fit:
     def _skew_stiffness(
         self, x: FloatArray, solution: FloatArray, covariance: FloatArray, places: IntArray
     ) -> tuple[float | None, Interval | None]:
-        """One over the differential compliance at rest: the sum of R/ω² of all modes, and E."""
+        """Inverse of the static differential compliance: the sum of R/ω² of all modes, and E."""
         difference = np.array([1.0, -2.0, 1.0])
         slope, rigid, common = (np.zeros(covariance.shape[0]) for _ in range(3))
         rigid[places[:_RIGID]] = difference
         common[places[:_RIGID]] = (0.25, 0.5, 0.25)
         moves, mean = float(rigid[x.size :] @ solution), float(common[x.size :] @ solution)
-        # A rigid body that the difference moves as well has no stiffness at rest.
+        # A rigid body that moves in the difference as well has no static stiffness.
         if x.size == _FIRST or moves > threshold.RIGID_SHARE * mean:
             return None, None
         for number, log_hz in enumerate(x[_FIRST::2]):
@@ -300,7 +302,7 @@ class _Fit:
 
 
 def _skew_share(matrix: FloatArray) -> float:
-    """Of the motion of a mode at the motors, by the larger eigenvector of its matrix."""
+    """Differential share of a mode's motion at the motors, from the larger eigenvector."""
     values, vectors = np.linalg.eigh(np.array([[matrix[0], matrix[1]], [matrix[1], matrix[2]]]))
     v = vectors[:, int(np.argmax(np.abs(values)))]
     return float((v[0] - v[1]) ** 2 / 2.0)

@@ -2,9 +2,9 @@
 
 With the setpoints as instruments, S_yr S_ur⁻¹ = Y U⁻¹ on every line, where the columns of Y and U
 are the spectra of two experiments whose setpoints are independent: noise that the loops feed back
-into the torques has no correlation with the setpoints, so that G is not biased by it (Pintelon &
-Schoukens, *System Identification*, 2012, sections 2.7 and 7.2). What differs between periods is
-noise; its covariance is carried to the four entries.
+into the torques is uncorrelated with the setpoints, so it does not bias G (Pintelon & Schoukens,
+*System Identification*, 2012, sections 2.7 and 7.2). Differences between periods are noise; its
+covariance is propagated to the four entries.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from backend.analysis.thresholds import coupled_response as threshold
 
 @dataclass(frozen=True)
 class PairRecord:
-    """One experiment, played and recorded; arrays [2, n] by axis, ``valid`` [n] of both together.
+    """One recorded experiment; arrays [2, n] by axis, ``valid`` [n] for both together.
 
-    ``sent`` are the setpoints of speed as they went out, without what is constant over a period.
+    ``sent`` are the speed setpoints as sent, without the part that is constant over a period.
     """
 
     excitation: Excitation
@@ -34,7 +34,7 @@ class PairRecord:
     valid: BoolArray | None = None
 
     def good_periods(self) -> list[int]:
-        """Numbers of the periods that count and have no gap."""
+        """Return the numbers of the evaluated periods without a gap."""
         e = self.excitation
         numbers = range(e.transient_periods, e.periods)
         if self.valid is None:
@@ -43,7 +43,7 @@ class PairRecord:
         return [p for p in numbers if np.all(self.valid[e.first_sample + p * n :][:n])]
 
     def spectra(self, signal: FloatArray, periods: list[int]) -> ComplexArray:
-        """Of a signal [2, n], on the excited lines: [periods, lines, 2]."""
+        """Return the spectra of a signal [2, n] on the excited lines: [periods, lines, 2]."""
         e = self.excitation
         n = e.period_samples
         starts = [e.first_sample + p * n for p in periods]
@@ -53,8 +53,8 @@ class PairRecord:
 
 @dataclass(frozen=True)
 class Controllers:
-    """From the error of the reported speed to the torque of each axis, on the lines f [n, 2], and
-    at their images fs - f.
+    """Response from the error of the reported speed to the torque of each axis [n, 2], on the lines
+    f and at their images fs - f.
     """
 
     at_line: ComplexArray
@@ -67,12 +67,11 @@ class CoupledResponse:
     axis i, in (rad/s)/Nm.
 
     ``covariance`` [n, 4, 4] is that of the complex entries in the order 11, 12, 21, 22 (circular:
-    half of a variance is that of the real part). ``freedom`` are the real degrees of freedom that
-    it is known with, and ``distortion`` [n] by how much more the realisations differ than the
-    noise between periods explains (a factor of the variance, 1 where nothing more; it is contained
-    in ``covariance``). ``unmodelled`` [n, 2, 2] is the part of each entry's deviation, contained in
-    the diagonal of ``covariance`` as well, that no noise makes: how those of two entries belong
-    together is not known.
+    half of a variance is that of the real part), ``freedom`` its real degrees of freedom.
+    ``distortion`` [n] is the variance between realisations relative to what the noise between
+    periods explains (1 where they agree); it is contained in ``covariance``. ``unmodelled`` [n, 2,
+    2] is the part of each entry's deviation that is not noise; it is contained in the diagonal of
+    ``covariance`` as well. Its correlation between entries is unknown.
     """
 
     frequency_hz: FloatArray
@@ -87,17 +86,18 @@ class CoupledResponse:
 
     @cached_property
     def spread(self) -> float:
-        """Factor from one deviation to the half width of a 95 % interval of one real quantity."""
+        """Factor from one deviation to half the 95 % interval of one real quantity."""
         return float(scipy.special.stdtrit(max(self.freedom, 1), 0.975))
 
     @property
     def std(self) -> FloatArray:
-        """One deviation of the real (or imaginary) part of each entry [n, 2, 2]."""
+        """Standard deviation of the real (or imaginary) part of each entry [n, 2, 2]."""
         variance = np.einsum("kii->ki", self.covariance).real
         return np.asarray(np.sqrt(np.maximum(variance, 0.0) / 2.0).reshape(-1, 2, 2))
 
     def slope_std(self, slope: ComplexArray) -> FloatArray:
-        """Deviation [n] of a real function of the entries whose differential is Re(slope · dG).
+        """Return the deviation [n] of a real function of the entries with differential Re(slope ·
+        dG).
 
         ``slope`` has the shape [n, 2, 2].
         """
@@ -108,14 +108,14 @@ class CoupledResponse:
     def without_images(
         self, share: FloatArray, beyond: FloatArray, controllers: Controllers | None
     ) -> CoupledResponse:
-        """Without what the sampled torques show of the setpoints' images.
+        """Return the response without the effect of the setpoints' images on the sampled torques.
 
-        Between two cycles the setpoints go on in a straight line; their image at fs - f is
-        ``share`` [n] of what they are at f, those beyond it ``beyond`` [n] at most, and each loop
-        makes torque of them that a sample cannot tell from that at f: of the sampled torque u',
-        (1 + q/C) u = u' - q y with q = share C*(fs - f), as the setpoint is u/C + y. With
-        ``controllers`` that is subtracted. How the loops answer to the images beyond is not known:
-        what they may do, G q (1/C + G) with their q, widens the covariance.
+        Between two cycles the setpoints are interpolated linearly; their image at fs - f is
+        ``share`` [n] of their value at f, the further images ``beyond`` [n] at most. Each loop
+        converts them into torque that samples cannot distinguish from torque at f: of the sampled
+        torque u', (1 + q/C) u = u' - q y with q = share C*(fs - f), as the setpoint is u/C + y.
+        With ``controllers`` that is subtracted. The response of the loops to the further images is
+        not known: their possible effect, G q (1/C + G) with their q, widens the covariance.
         """
         g, covariance = self.response, self.covariance
         if controllers is None:
@@ -138,8 +138,8 @@ class CoupledResponse:
         )
 
     def not_better_than_known(self) -> CoupledResponse:
-        """With a covariance that holds a small shift of all frequencies, and a share of each entry:
-        what is left of images and filters is no noise.
+        """Return the response with a covariance that includes a small shift of all frequencies and
+        a share of each entry: residues of images and filters are not noise.
         """
         g, f = self.response, self.frequency_hz
         shift = threshold.SHIFTED * f[:, None, None] * np.gradient(g, f, axis=0)
@@ -147,7 +147,7 @@ class CoupledResponse:
         return replace(self, covariance=self.covariance + _diagonal(left / self.spread))
 
     def without_filter(self, rows: ComplexArray) -> CoupledResponse:
-        """Without filters [n, 2] that the speed of each axis has passed."""
+        """Return the response without filters [n, 2] in the speed path of each axis."""
         each = np.repeat(1.0 / rows, 2, axis=1)
         return replace(
             self,
@@ -159,9 +159,9 @@ class CoupledResponse:
         )
 
     def transformed(self, rows: FloatArray, columns: FloatArray) -> CoupledResponse:
-        """``rows`` G ``columns``, with the covariance of that; the coherence is left out (NaN).
+        """Return ``rows`` G ``columns`` with its covariance; the coherence is omitted (NaN).
 
-        What is unmodelled in the entries may add up: it is summed, not averaged.
+        Unmodelled deviations of the entries may add up: they are summed, not averaged.
         """
         each = np.kron(rows, columns.T)
         before = np.zeros(self.response.shape) if self.unmodelled is None else self.unmodelled
@@ -181,12 +181,12 @@ class CoupledResponse:
 
 
 def _diagonal(deviation: FloatArray) -> FloatArray:
-    """Covariance [n, 4, 4] of complex entries with these deviations [n, 2, 2] of each part."""
+    """Covariance [n, 4, 4] of complex entries with these deviations [n, 2, 2] per component."""
     return np.asarray(2.0 * (deviation.reshape(-1, 4) ** 2)[:, :, None] * np.eye(4))
 
 
 def estimate(records: tuple[PairRecord, ...]) -> CoupledResponse:
-    """From pairs of experiments of common phases, one pair behind the other.
+    """Estimate the response from consecutive pairs of experiments with the same phases.
 
     Raises:
         ValueError: no pair, or a realisation has fewer than two whole periods in an experiment.
@@ -196,7 +196,7 @@ def estimate(records: tuple[PairRecord, ...]) -> CoupledResponse:
     pairs = [_Pair.of(records[i : i + 2]) for i in range(0, len(records), 2)]
     e = records[0].excitation
     f = e.lines * (e.sample_rate_hz / e.period_samples)
-    # Realisations have other phases: summed after each is taken to its own setpoints.
+    # Realisations differ in phase: each is referred to its own setpoints before the sum.
     to_speed = np.sum([pair.y @ pair.to_reference for pair in pairs], axis=0)
     to_torque = np.sum([pair.u @ pair.to_reference for pair in pairs], axis=0)
     g = to_speed @ np.linalg.inv(to_torque)
@@ -235,12 +235,12 @@ class _Pair:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Periods of each experiment."""
+        """Number of periods of each experiment."""
         return self.speeds[0].shape[0], self.speeds[1].shape[0]
 
     @staticmethod
     def of(records: tuple[PairRecord, ...]) -> _Pair:
-        """The spectra of a pair.
+        """Return the spectra of a pair.
 
         Raises:
             ValueError: fewer than two whole periods.
@@ -263,7 +263,7 @@ class _Pair:
 
 
 def _noise(pairs: list[_Pair], g: ComplexArray) -> tuple[ComplexArray, int]:
-    """Covariance [lines, 2, 2] of speed less G times torque in one period, and its freedom."""
+    """Covariance [lines, 2, 2] of speed minus G times torque in one period, and its freedom."""
     total = np.zeros(g.shape, np.complex128)
     count = 0
     for pair in pairs:
@@ -276,10 +276,10 @@ def _noise(pairs: list[_Pair], g: ComplexArray) -> tuple[ComplexArray, int]:
 
 
 def _distortion(pairs: list[_Pair], g: ComplexArray, noise: ComplexArray) -> FloatArray:
-    """Variance between realisations over what the noise makes of it, 1 at least [lines].
+    """Variance between realisations relative to what the noise explains, at least 1 [lines].
 
-    Nonlinear distortion repeats with every period and differs with the phases (Pintelon &
-    Schoukens section 4.3). One realisation shows none of it.
+    Nonlinear distortion repeats in every period and differs with the phases (Pintelon & Schoukens
+    section 4.3). A single realisation cannot show it.
     """
     lines = g.shape[0]
     if len(pairs) < 2:
@@ -290,7 +290,7 @@ def _distortion(pairs: list[_Pair], g: ComplexArray, noise: ComplexArray) -> Flo
         left = []
         for pair in pairs:
             mean = pair.y[:, :, experiment] - np.einsum("kij,kj->ki", g, pair.u[:, :, experiment])
-            # Taken to the phase of the setpoint of axis 1, which both experiments share.
+            # Referred to the phase of the setpoint of axis 1, which both experiments share.
             turn = pair.to_reference[:, experiment, 0]
             scaled = np.sqrt(pair.counts[experiment]) * turn / np.abs(turn)
             left.append(mean * scaled[:, None])

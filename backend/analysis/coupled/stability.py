@@ -1,10 +1,10 @@
-"""Two speed loops on one machine: the stability of the pair, and gains that keep it.
+"""Two speed loops on one machine: stability of the pair, and gains that preserve it.
 
-L = G C, C the controllers of both axes on the diagonal. The pair is stable where det(I + L) goes
-round the origin as often as its open loops demand (generalised Nyquist criterion, MacFarlane &
+L = G C, with the controllers of both axes on the diagonal of C. The pair is stable if det(I + L)
+encircles the origin as often as the open loops require (generalised Nyquist criterion, MacFarlane &
 Postlethwaite 1977; Skogestad & Postlethwaite, *Multivariable Feedback Control*, 2nd ed. 2005,
-section 4.9). Ms is the peak of the largest singular value of (I + L)⁻¹ (section 6.3). Everything is
-stated for the measured lines.
+section 4.9). Ms is the peak of the largest singular value of (I + L)⁻¹ (section 6.3). All
+statements hold for the measured lines.
 """
 
 from __future__ import annotations
@@ -24,10 +24,12 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class JointMargins:
-    """``stable`` None where a locus is near 1 or above at the highest line: the band does not show
-    it. ``ms`` is the joint peak with the ends of its 95 % interval, ``ms_alone`` the peak of
-    each axis as if the other one had no torque. ``phase_margin_deg`` is the smallest of both
-    eigenloci, ``crossover_hz`` the highest at which one falls through 1.
+    """Margins of the pair of loops.
+
+    ``stable`` is None where a locus is near 1 or above at the highest line, so that the band cannot
+    decide it. ``ms`` is the joint peak sensitivity with its 95 % interval, ``ms_alone`` the peak of
+    each axis with the other one without torque. ``phase_margin_deg`` is the smallest of both
+    eigenloci, ``crossover_hz`` the highest frequency at which one falls through 1.
     """
 
     stable: bool | None
@@ -50,29 +52,29 @@ class Design:
 
 
 def interaction(response: ComplexArray) -> FloatArray:
-    """Relative gain of axis 1 by itself, |λ₁₁| [n] of the relative gain array; 1 is no coupling.
+    """Return |λ₁₁| [n] of the relative gain array, the relative gain of axis 1; 1 without coupling.
 
-    λ₁₁ = 1/(1 - G₁₂G₂₁/(G₁₁G₂₂)) (Bristol 1966): by how much the response of an axis changes when
-    the other one is held still. It does not depend on units of either axis.
+    λ₁₁ = 1/(1 - G₁₂G₂₁/(G₁₁G₂₂)) (Bristol 1966): the factor by which the response of an axis
+    changes when the other one is held still. It does not depend on the units of either axis.
     """
     own = response[:, 0, 0] * response[:, 1, 1]
     return np.asarray(np.abs(own / (own - response[:, 0, 1] * response[:, 1, 0])))
 
 
 def coupling(response: CoupledResponse) -> tuple[FloatArray, FloatArray]:
-    """√|G₁₂G₂₁/(G₁₁G₂₂)| [n] and its deviation: the part of an axis' motion that the other's
-    torque makes, 0 without coupling, 1 for one rigid body.
+    """Return √|G₁₂G₂₁/(G₁₁G₂₂)| [n] and its deviation: the share of an axis' motion caused by the
+    other's torque, 0 without coupling, 1 for one rigid body.
     """
     g = response.response
     ratio = np.sqrt(np.abs(g[:, 0, 1] * g[:, 1, 0] / (g[:, 0, 0] * g[:, 1, 1])))
-    # Of the logarithm: half of each entry's relative change.
+    # Slope of the logarithm: half of the relative change of each entry.
     slope = 0.5 * np.array([[-1.0, 1.0], [1.0, -1.0]]) / g
     return ratio, ratio * response.slope_std(slope)
 
 
 def shows_coupling(ratio: FloatArray, half: FloatArray) -> bool:
-    """Whether a coupling [n] is above what two separate machines may show, by the near end of its
-    95 % interval on any line: one rigid body has 1 on the lines below its modes.
+    """Whether a coupling [n] exceeds what two separate machines may show, judged by the near end of
+    its 95 % interval on any line: one rigid body has 1 on the lines below its modes.
     """
     return bool(np.max(ratio - half) > threshold.COUPLED)
 
@@ -80,7 +82,7 @@ def shows_coupling(ratio: FloatArray, half: FloatArray) -> bool:
 def joint_margins(
     response: CoupledResponse, controllers: ComplexArray, factor: float = 1.0
 ) -> JointMargins:
-    """Margins of the pair; ``controllers`` [n, 2] from speed error to torque of each axis."""
+    """Return the margins of the pair; ``controllers`` [n, 2]: speed error to torque per axis."""
     f = response.frequency_hz
     c = factor * controllers
     loop = response.response * c[:, None, :]
@@ -94,7 +96,7 @@ def joint_margins(
     return JointMargins(
         stable=is_stable(loop),
         ms=1.0 / float(smallest[worst]),
-        # The nearest place may be any line: the far end is that of the worst of them.
+        # Any line may be the nearest one: the far end is that of the worst of them.
         ms_ci95=(1.0 / float(high[worst]), 1.0 / max(float(np.min(low)), 1e-3)),
         ms_hz=float(f[worst]),
         ms_alone=(alone[0], alone[1]),
@@ -107,10 +109,10 @@ def joint_margins(
 def design(
     response: CoupledResponse, controllers: ComplexArray, *, ms: float, phase_margin_deg: float
 ) -> Design | None:
-    """The largest common factor for both speed gains that keeps these goals at the far end of the
-    intervals of all lines; None where even the smallest does not.
+    """Return the largest common factor for both speed gains that meets these goals at the far end
+    of the intervals of all lines; None where even the smallest does not.
 
-    Every smaller factor down to the smallest that is tried is stable as well.
+    Every smaller factor of the tried range is stable as well.
     """
     best: Design | None = None
     factors = np.geomspace(*threshold.FACTORS, threshold.STEPS)
@@ -130,7 +132,7 @@ def design(
 
 
 def eigenloci(loop: ComplexArray) -> ComplexArray:
-    """Both eigenvalues of L [n, 2], each followed from line to line."""
+    """Return both eigenvalues of L [n, 2], tracked from line to line."""
     values = np.linalg.eigvals(loop)
     for k in range(1, values.shape[0]):
         straight = np.abs(np.log(values[k] / values[k - 1])).sum()
@@ -140,12 +142,12 @@ def eigenloci(loop: ComplexArray) -> ComplexArray:
 
 
 def is_stable(loop: ComplexArray) -> bool | None:
-    """The generalised criterion on lines [n, 2, 2] in ascending order; None where a locus is near 1
-    or above at the highest of them.
+    """Apply the generalised Nyquist criterion to lines [n, 2, 2] in ascending order.
 
-    Followed down from the highest line, where I + L is near I, the phase of det(I + L) ends at the
-    sum of the angles of 1 + λ of both loci: of one above 1 within (-270°, 90°), up to two
-    integrators, and of one below 1 (a spring between the axes) within ±90°.
+    None where a locus is near 1 or above at the highest line. Followed down from the highest line,
+    where I + L is near I, the phase of det(I + L) ends at the sum of the angles of 1 + λ of both
+    loci: a locus above 1 within (-270°, 90°), up to two integrators, and one below 1 (a spring
+    between the axes) within ±90°.
     """
     values = np.linalg.eigvals(loop)
     if np.max(np.abs(values[-1])) >= threshold.OPEN:
@@ -163,7 +165,7 @@ def is_stable(loop: ComplexArray) -> bool | None:
 def _distance(
     response: CoupledResponse, loop: ComplexArray, c: ComplexArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Smallest singular value [n] of I + L, and the ends of its interval."""
+    """Smallest singular value [n] of I + L, and the ends of its 95 % interval."""
     u, s, v = np.linalg.svd(np.eye(2) + loop)
     left, right = u[:, :, 1].conj(), v[:, 1, :].conj()
     # d σ = Re(u^H dG C v)

@@ -1,1 +1,1 @@
-"""What a repeated motion asks of a motor: effective torque, braking energy, heat."""
+"""Load of a repeated motion on a motor: effective torque, braking energy, heat."""

@@ -1,10 +1,10 @@
-"""How warm a motor becomes under a repeated load, and when it is too warm. Pure.
+"""Motor temperature under a repeated load, and the time until it exceeds its limit.
 
-A catalogue states of a motor's heat its rated torque (warm for long at 40 °C, IEC 60034-1) and one
-time constant. How the rest is divided it does not: how much of the rise lies between winding and
-housing, how fast the winding follows, which part of the losses depends on the speed, how far
-current exceeds torque at high torque. So the answer is a range over motors that all agree with the
-catalogue: two bodies (winding, housing), each of those quantities at its ends.
+Of a motor's thermal behaviour a catalogue states the rated torque (continuous at 40 °C,
+IEC 60034-1) and one time constant. It does not state how much of the rise lies between winding and
+housing, how fast the winding follows, which part of the losses depends on the speed, or how far
+the current exceeds the torque at high torque. The result is therefore a range over all motors that
+agree with the catalogue: two bodies (winding, housing), each of those quantities at its ends.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ import scipy
 from backend.analysis.duty.load import Signals
 
 FloatArray = npt.NDArray[np.float64]
-#: The ambient temperature for which rated torque holds (IEC 60034-1), in °C.
+#: Ambient temperature for which the rated torque holds (IEC 60034-1), °C.
 RATED_AMBIENT_C = 40.0
-#: Share of the rated rise between winding and housing.
+#: Share of the rated temperature rise between winding and housing.
 _WINDING = (0.15, 0.3, 0.5)
 #: Time constant of the winding against the housing, in s, and as a share of the motor's.
 _WINDING_S, _WINDING_SHARE = (10.0, 60.0), (0.02, 0.1)
-#: Share of the rated losses that depends on the speed alone, and the power of the speed. Where the
-#: torque at standstill is stated, the share is known to this much of it.
+#: Share of the rated losses that depends on the speed alone, and the exponent of the speed. Where
+#: the torque at standstill is stated, the share is known to within the relative error ``_STATED``.
 _SPEED_SHARE, _SPEED_POWER, _STATED = (0.0, 0.35), (1.0, 2.0), 0.15
-#: Current above torque at three times the rated torque, per unit of torque above the rated one.
+#: Current in excess of torque at three times rated torque, per unit of torque above the rated one.
 _SATURATION = (0.0, 0.07)
-#: Copper has 0.39 %/K at 20 °C: of the hot resistance, per rated rise of 60 to 125 K.
+#: Copper has 0.39 %/K at 20 °C: relative to the hot resistance, per rated rise of 60 to 125 K.
 _COPPER = (0.0, 0.35)
-#: A catalogue's time constant is that of a motor on some flange; this far it is trusted.
+#: Range of the time constant: the catalogue's value holds for a motor on some flange.
 _TIME_CONSTANT = (0.75, 1.3)
-#: Searched for a moment up to this many time constants.
+#: Longest time searched for the trip, in time constants.
 _LONGEST = 12.0
 _MOMENTS = 400
 
 
 @dataclass(frozen=True)
 class Heat:
-    """Ends of the range. ``rise`` is the highest rise as a share of the permitted one; ``trip_s``
-    from a motor as cold as its surroundings, None where it is never too warm; ``about_s`` is that
-    of the motor in the middle of the range."""
+    """Ends of the range. ``rise`` is the highest temperature rise as a share of the permitted one;
+    ``trip_s`` is the time to the limit from a motor at ambient temperature, None where the limit is
+    never reached; ``about_s`` is that time for the motor in the middle of the range."""
 
     rise: tuple[float, float]
     trip_s: tuple[float | None, float | None]
@@ -53,7 +53,7 @@ class Heat:
 
 @dataclass(frozen=True)
 class _Losses:
-    """Of one kind of motor, in units of the rated losses: in the winding [n], and elsewhere."""
+    """Losses of one motor variant over the rated losses: in the winding [n], and elsewhere."""
 
     share: float
     winding: FloatArray
@@ -61,9 +61,9 @@ class _Losses:
 
 
 def permitted_rise(ambient_c: float, rated_rise_k: float | None) -> float | None:
-    """Rise that is permitted at this ambient temperature, as a share of the rated one.
+    """Return the permitted rise at this ambient temperature, as a share of the rated rise.
 
-    None where that needs the rated rise and nobody has stated it.
+    None where the rated rise is needed and not stated.
     """
     if ambient_c == RATED_AMBIENT_C:
         return 1.0
@@ -81,11 +81,11 @@ def heat_of(
     scale: tuple[float, float] = (1.0, 1.0),
     standstill: float | None = None,
 ) -> Heat:
-    """The range of the rise, and of the moment at which it exceeds what is permitted.
+    """Return the range of the rise, and of the time at which it exceeds the permitted value.
 
-    ``scale`` are the ends of the effective torque's interval, as shares of it. ``standstill`` is
-    the torque that the motor carries for long without turning, per unit of the rated torque: the
-    squares of both differ by the losses of the speed.
+    ``scale`` are the ends of the effective torque's interval, as factors. ``standstill`` is the
+    continuous torque at standstill, per unit of the rated torque: the squares of both differ by the
+    speed-dependent losses.
     """
     even = signals.evenly(20_000)
     rises: list[float] = []
@@ -140,8 +140,8 @@ def _one(
     saturation: float,
     factor: float = 1.0,
 ) -> _Losses:
-    """Losses of one kind of motor. Without a rated speed nothing is known of the speed's part:
-    ``power`` 0 takes it as that of the rated speed, infinity as none, others as half."""
+    """Losses of one motor variant. Without a rated speed the speed-dependent part is unknown:
+    ``power`` 0 takes it as at rated speed, infinity as none, other values as half."""
     torque = np.abs(even.torque_percent) / 100.0
     current = factor * torque * (1.0 + saturation * np.maximum(torque - 1.0, 0.0))
     if rated_rpm is None:
@@ -152,7 +152,7 @@ def _one(
 
 
 class _Bodies:
-    """Winding and housing, with resistances such that the rated load ends at a rise of one."""
+    """Winding and housing, with thermal resistances for which the rated load gives a rise of 1."""
 
     def __init__(self, losses: _Losses, winding: float, tau_w: float, spacing_s: float) -> None:
         whole = winding * (1.0 - losses.share) + (1.0 - winding)
@@ -163,21 +163,21 @@ class _Bodies:
         self._swing = self._to_housing * self._swing_of(losses.winding, spacing_s)
 
     def _swing_of(self, losses: FloatArray, spacing_s: float) -> float:
-        """What the winding rises above its mean within the repeated load, per unit of loss."""
+        """Peak rise of the winding above its mean within the repeated load, per unit of loss."""
         decay = float(np.exp(-spacing_s / self._tau_w))
         about = np.concatenate([losses, losses]) - self._copper
         answer = scipy.signal.lfilter([1.0 - decay], [1.0, -decay], about)
         return float(max(np.max(answer[losses.size :]), 0.0))
 
     def highest(self) -> float:
-        """Rise at last, with the resistance of the permitted temperature."""
+        """Return the final rise, with the resistance at the permitted temperature."""
         copper, air = self._copper, self._to_air
         return self._to_housing * copper + air * (copper + self._elsewhere) + self._swing
 
     def too_warm_s(self, permitted: float, tau_s: float, copper: float) -> float | None:
-        """When the winding has risen by ``permitted``; None if never.
+        """Return when the winding has risen by ``permitted``; None if never.
 
-        ``copper`` is how much the resistance rises per rated rise, of that at the limit.
+        ``copper`` is the increase of the resistance per rated rise, relative to that at the limit.
         """
         if self.highest() < permitted:
             return None

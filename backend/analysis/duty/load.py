@@ -1,7 +1,7 @@
-"""Torque and speed of a machine's cycle: its period, effective torque, power and overload. Pure.
+"""Torque and speed of a machine's cycle: its period, effective torque, power and overload.
 
-Samples lie unevenly in time, as polling gives them. Between two samples torque and speed are taken
-as straight lines; where a sample is missing for long nothing is assumed.
+Samples are uneven in time, as polling gives them. Between two samples torque and speed are
+interpolated linearly; longer gaps are left out.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import scipy
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _RAD_S = 2.0 * np.pi / 60.0
-#: Intervals longer than this many usual ones, and than this time, are gaps.
+#: An interval is a gap if it is longer than this many usual ones, and than this time, s.
 _GAP_FACTOR, _GAP_S = 5.0, 0.25
-#: A period repeats itself if the correlation of the signals one period apart is at least this;
-#: a shorter one counts rather than its multiple where it is nearly as good. The correlation must
-#: have fallen below `_FALLEN` before.
+#: A period counts if the correlation of the signals one period apart is at least ``_REPEATS``; a
+#: period is preferred to its multiple if its correlation is at least ``_NEARLY`` of the best one.
+#: The correlation must have fallen below ``_FALLEN`` before.
 _REPEATS, _NEARLY, _FALLEN = 0.8, 0.97, 0.5
 _MOST_SAMPLES = 1 << 16
 
 
 @dataclass(frozen=True)
 class Signals:
-    """[n] each: s (rising), % of rated, rpm."""
+    """Arrays [n]: time in s (rising), torque in % of rated, speed in rpm."""
 
     time_s: FloatArray
     torque_percent: FloatArray
@@ -34,26 +34,26 @@ class Signals:
 
     @property
     def spacing_s(self) -> float:
-        """Usual time between two samples."""
+        """Median time between two samples, s."""
         return float(np.median(np.diff(self.time_s)))
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last sample."""
+        """Time from the first to the last sample, s."""
         return float(self.time_s[-1] - self.time_s[0])
 
     @property
     def known(self) -> BoolArray:
-        """Of each interval between two samples [n − 1], whether it is none of the gaps."""
+        """False for each interval between two samples [n − 1] that is a gap."""
         return np.asarray(np.diff(self.time_s) <= max(_GAP_FACTOR * self.spacing_s, _GAP_S))
 
     @property
     def longest_gap_s(self) -> float:
-        """Longest time between two samples."""
+        """Longest time between two samples, s."""
         return float(np.max(np.diff(self.time_s)))
 
     def evenly(self, most: int = _MOST_SAMPLES) -> Signals:
-        """The same on a grid of even spacing."""
+        """Return the signals on a grid of even spacing."""
         spacing = max(self.spacing_s, self.duration_s / most)
         time = np.arange(self.time_s[0], self.time_s[-1], spacing)
         return Signals(
@@ -65,7 +65,7 @@ class Signals:
 
 @dataclass(frozen=True)
 class Effective:
-    """Mean over whole periods, and its 95 % interval where there are at least three of them."""
+    """Value over whole periods, and its 95 % interval where there are at least three of them."""
 
     value: float
     ci95: tuple[float | None, float | None]
@@ -73,7 +73,7 @@ class Effective:
 
 @dataclass(frozen=True)
 class Power:
-    """At the motor's shaft, losses left out. W; J in one period, or in the whole recording."""
+    """Power at the motor's shaft without losses, W; energy in J per period, or per recording."""
 
     highest_w: float
     mean_w: float
@@ -84,16 +84,16 @@ class Power:
 
 @dataclass(frozen=True)
 class Budget:
-    """I²t: ``used`` is the highest share of the budget; None until when it is never exceeded."""
+    """I²t budget: ``used`` is the highest share of it; ``trip_s`` None if never exceeded."""
 
     used: float
     trip_s: float | None
 
 
 def period_of(signals: Signals) -> float | None:
-    """Time after which torque and speed repeat themselves; None where they do not, in s.
+    """Return the period of torque and speed in s; None where they are not periodic.
 
-    By the correlation of the signals with themselves; at least two periods must be there.
+    From the autocorrelation of the signals; the recording must contain at least two periods.
     """
     even = signals.evenly(1 << 14)
     spacing, size = even.spacing_s, even.time_s.size
@@ -135,14 +135,14 @@ def period_of(signals: Signals) -> float | None:
 
 
 def _refined(correlation: FloatArray, lag: int) -> float:
-    """Place of the highest point of a parabola through three samples."""
+    """Position of the peak of a parabola through three samples."""
     before, here, after = (float(correlation[lag + k]) for k in (-1, 0, 1))
     bend = before - 2.0 * here + after
     return lag if bend >= 0.0 else lag + 0.5 * (before - after) / bend
 
 
 def whole_periods(signals: Signals, period_s: float | None) -> FloatArray:
-    """Moments [k + 1] at which k whole periods begin and end; begin and end without a period."""
+    """Return the limits [k + 1] of k whole periods, s; start and end where there is no period."""
     begin, duration = float(signals.time_s[0]), signals.duration_s
     if period_s is None or period_s > duration:
         return np.array([begin, begin + duration])
@@ -150,7 +150,7 @@ def whole_periods(signals: Signals, period_s: float | None) -> FloatArray:
 
 
 def effective_torque(signals: Signals, moments: FloatArray) -> Effective:
-    """Root mean square of the torque in %, by period."""
+    """Return the root mean square of the torque in %, with its interval over periods."""
     a, b = signals.torque_percent[:-1], signals.torque_percent[1:]
     squares = np.array(_means(signals, (a * a + a * b + b * b) / 3.0, moments))
     value = float(np.sqrt(np.mean(squares)))
@@ -163,16 +163,16 @@ def effective_torque(signals: Signals, moments: FloatArray) -> Effective:
 
 
 def mean_speed_rpm(signals: Signals, moments: FloatArray) -> float:
-    """Mean of the speed's amount."""
+    """Return the mean magnitude of the speed, rpm."""
     speed = np.abs(signals.speed_rpm)
     return float(np.mean(_means(signals, 0.5 * (speed[:-1] + speed[1:]), moments)))
 
 
 def power_of(signals: Signals, rated_nm: float, moments: FloatArray) -> Power:
-    """Mechanical power; what is negative goes back to the drive, less the losses on the way."""
+    """Return the mechanical power; negative power returns to the drive, less the losses."""
     torque, speed = signals.torque_percent * rated_nm / 100.0, signals.speed_rpm * _RAD_S
     power = torque * speed
-    # Torque times speed is a parabola between two samples: Simpson's rule is exact.
+    # Between two samples torque times speed is a parabola, for which Simpson's rule is exact.
     middle = 0.25 * (torque[:-1] + torque[1:]) * (speed[:-1] + speed[1:])
 
     def over(values: FloatArray, between: FloatArray) -> FloatArray:
@@ -190,7 +190,7 @@ def power_of(signals: Signals, rated_nm: float, moments: FloatArray) -> Power:
 
 
 def _means(signals: Signals, by_interval: FloatArray, moments: FloatArray) -> list[float]:
-    """Means of a quantity [n − 1] between these moments, gaps left out."""
+    """Means of a quantity [n − 1] between these moments, without gaps."""
     long = np.diff(signals.time_s) * signals.known
     amount = np.concatenate([[0.0], np.cumsum(by_interval * long)])
     passed = np.concatenate([[0.0], np.cumsum(long)])
@@ -200,17 +200,17 @@ def _means(signals: Signals, by_interval: FloatArray, moments: FloatArray) -> li
 
 
 def share_above(signals: Signals, percent: float) -> float:
-    """Share of the time in which the torque's amount is above this."""
+    """Return the share of the time in which the magnitude of the torque exceeds ``percent``."""
     long = np.diff(signals.time_s) * signals.known
     middle = 0.5 * np.abs(signals.torque_percent[:-1] + signals.torque_percent[1:])
     return float(np.sum(long[middle > percent]) / max(float(np.sum(long)), 1e-12))
 
 
 def i2t(signals: Signals, overload_percent: float, overload_s: float) -> Budget:
-    """Square of the torque above the rated one, added up, against what a rating permits.
+    """Integrate the square of the torque above the rated one, and compare it with a rating.
 
     The rating: ``overload_percent`` of rated torque for ``overload_s`` from the rated load. The
-    sum goes down again below rated torque, never below zero. The recording repeats itself.
+    sum falls again below rated torque, but not below zero. The recording is taken to repeat.
     """
     budget = ((overload_percent / 100.0) ** 2 - 1.0) * overload_s
     even = signals.evenly()
@@ -231,6 +231,6 @@ def i2t(signals: Signals, overload_percent: float, overload_s: float) -> Budget:
 
 
 def _added_up(steps: FloatArray, start: float) -> FloatArray:
-    """Sum that never falls below zero (the sum less its lowest value so far)."""
+    """Running sum limited to zero from below (the sum minus its lowest value so far)."""
     total = start + np.cumsum(steps)
     return np.asarray(total - np.minimum(np.minimum.accumulate(total), 0.0))

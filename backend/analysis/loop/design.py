@@ -1,8 +1,8 @@
-"""Loop gains and notches on the measured response.
+"""Design of loop gains and notches on the measured response.
 
-Candidates are the best with no notch, one, two, … for each mark, every one with the highest gain
-that keeps the goals for all modes shifted by ±5 % and a range of damping; the prediction rests on
-the measured lines, and on the model only between and above them.
+For each mark the candidates are the best loops with no notch, one, two, …, each with the highest
+gain that meets the goals for all modes shifted by ±5 % and a range of damping. The prediction uses
+the measured lines, and the model only between and above them.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ _POSITION_GOALS = Goals(8.0, 60.0, 1.6)
 
 @dataclass(frozen=True)
 class Candidate:
-    """One row of the table.
+    """One row of the candidate table.
 
-    ``bandwidth_hz`` (-3 dB), ``overshoot_percent`` and ``settling_s`` (2 %) are of the speed
-    loop; ``nominal`` margins are predicted for the axis as measured, ``guaranteed`` is the worst
-    over all shifts less what a measurement may be off; ``phase_cost_deg`` is what the notches
-    take at the crossover. ``filters`` are the corners that the design counts on.
+    ``bandwidth_hz`` (-3 dB), ``overshoot_percent`` and ``settling_s`` (2 %) are of the speed loop;
+    ``nominal`` margins are predicted for the axis as measured, ``guaranteed`` are the worst over
+    all shifts less the reserve for measurement errors; ``phase_cost_deg`` is the phase loss of the
+    notches at the crossover frequency. ``filters`` are the filter corners that the design assumes.
     """
 
     notches: tuple[Notch, ...]
@@ -72,11 +72,11 @@ def design(
     slots: int,
     notch_response: NotchResponse = continuous_notch,
 ) -> tuple[Candidate, ...]:
-    """All useful candidates, fastest first; up to three carry a mark.
+    """Return all useful candidates, fastest first; up to three carry a mark.
 
-    ``inertia_kgm2`` is the whole axis', ``slots`` the drive's notches, ``notch_response`` what
-    the drive makes of a notch (ValueError where it cannot, the notch is then left out). Empty
-    when nothing meets any goal.
+    ``inertia_kgm2`` is that of the whole axis, ``slots`` the number of the drive's notches,
+    ``notch_response`` the response of a notch as the drive realises it (it raises ValueError where
+    the drive cannot; the notch is then left out). Empty when no loop meets any goal.
     """
     search = LoopSearch(plant, inertia_kgm2, loops, notch_response)
     goals = {mark: goals_for(load, mark).with_reserve() for mark in MARKS}
@@ -89,7 +89,7 @@ def design(
             continue
         winner = _winner(search, best[mark], firsts, goals[mark])
         if stricter is not None:
-            # What keeps stricter goals keeps these with at least as much gain.
+            # A loop that meets the stricter goals meets these with at least as much gain.
             winner = search.better(winner, stricter.shape, goals[mark])
         stricter = winner
         rows += [_candidate(search, found, ()) for found in best[mark] if found is not winner]
@@ -100,7 +100,7 @@ def design(
 def _winner(
     search: LoopSearch, found: Sequence[Found], others: Sequence[Found], goals: Goals
 ) -> Found:
-    """The best that leads from these, and from what is best for other goals."""
+    """The best design reached from these, and from the best ones for the other goals."""
     first = max(found, key=_merit)
     bar = replace(first, merit=BEGUN * first.merit)
     shapes = [s for s in dict.fromkeys(other.shape for other in others) if s != first.shape]
@@ -115,7 +115,7 @@ def _merit(found: Found) -> float:
 
 
 def _candidate(search: LoopSearch, found: Found, marks: tuple[Mark, ...]) -> Candidate:
-    """Complete one row: position gain, prediction, step."""
+    """Complete one row with position gain, prediction and step response."""
     f, plant, shape = search.frequency_hz, search.plant, found.shape
     filters = search.fixed(shape)
     assert filters is not None
@@ -141,7 +141,7 @@ def described(
     f: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains, guaranteed: Goals, *,
     notches: tuple[Notch, ...], filters: LoopFilters,
 ) -> Candidate:  # fmt: skip
-    """Prediction and step of a loop on a plant; ``fixed`` is all of the loop but its gains."""
+    """Return prediction and step of a loop on a plant; ``fixed`` is the loop except its gains."""
     loop = speed_loop(f, plant, fixed, gains)
     closed = closed_from_open(loop)
     time, value = step_of_closed_loop(f, closed)
@@ -164,7 +164,7 @@ def described(
 def _phase_cost(
     search: LoopSearch, found: Found, filters: ComplexArray, crossover_hz: float | None
 ) -> float:
-    """What the notches take at the crossover, in degrees."""
+    """Phase loss of the notches at the crossover frequency, in degrees."""
     bare = search.fixed(replace(found.shape, notches=()))
     if crossover_hz is None or not found.shape.notches or bare is None:
         return 0.0
@@ -173,7 +173,10 @@ def _phase_cost(
 
 
 def _position_gain(f: FloatArray, loops: ComplexArray, speed_bandwidth_hz: float) -> float:
-    """Highest position gain with 8 dB, 60° and Ms 1.6, at most a quarter of the speed bandwidth."""
+    """Highest position gain with 8 dB, 60° and Ms 1.6, at most a quarter of the speed bandwidth.
+
+    Where no tried gain meets them, a quarter of the lowest tried, without a check.
+    """
     outer = closed_from_open(loops) / (1j * TURN * f)
     trial = np.geomspace(0.05, 1.0, 16) * TURN * speed_bandwidth_hz / 4.0
     for gain in trial[::-1]:
@@ -184,7 +187,7 @@ def _position_gain(f: FloatArray, loops: ComplexArray, speed_bandwidth_hz: float
 
 
 def _table(found: list[Candidate]) -> tuple[Candidate, ...]:
-    """Merge equal rows with all their marks, fastest first."""
+    """Merge equal rows with all their marks, and sort them fastest first."""
     rows: dict[tuple[object, ...], Candidate] = {}
     for c in found:
         key = (c.notches, c.gains, c.filters)

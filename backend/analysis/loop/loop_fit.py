@@ -1,4 +1,4 @@
-"""The controller of a closed loop, from its own torque and the velocity."""
+"""Fit of the controller of a closed loop, from its own torque and the velocity."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray
 def fit_loop(
     frequency_hz: FloatArray, own_torque: ComplexArray, velocity: ComplexArray, path: SignalPath
 ) -> LoopModel:
-    """Controller of the closed loop from its own torque and the velocity, line by line.
+    """Fit the controller of a closed loop to its own torque and the velocity on the lines.
 
     ``own_torque`` and ``velocity`` are cross spectra with the injection. Only lines well below
     half the sample rate are used, since both are sampled signals.
@@ -36,7 +36,7 @@ def fit_loop(
     a = np.column_stack([np.ones(f.size), 1.0 / s, 1.0 / s**2]) / np.abs(reference)[:, None]
     b = reference / np.abs(reference)
     matrix, target = np.vstack([a.real, a.imag]), np.concatenate([b.real, b.imag])
-    # A robust pass: single lines spoilt by friction must not bend the gains.
+    # Robust reweighting: single lines spoilt by friction must not bias the gains.
     row: FloatArray = np.ones(target.size)
     c: FloatArray = np.zeros(3)
     for _ in range(4):

@@ -1,6 +1,6 @@
-"""What a loop must keep, and whether it does for everything that the axis may be.
+"""Goals for a loop, and the check that it meets them for every plant that the axis may be.
 
-Gain margin, phase margin and maximum sensitivity as in Åström & Hägglund, *Advanced PID Control*
+Gain margin, phase margin and peak sensitivity as in Åström & Hägglund, *Advanced PID Control*
 (2006), section 4.6.
 """
 
@@ -20,14 +20,14 @@ Mark = Literal["robust", "balanced", "fast"]
 
 @dataclass(frozen=True)
 class Goals:
-    """What every candidate must keep in its worst case."""
+    """Margins that a candidate must meet in its worst case; ``ms`` is the peak sensitivity."""
 
     gain_margin_db: float
     phase_margin_deg: float
     ms: float
 
     def with_reserve(self) -> Goals:
-        """What a design must keep for a measurement of it to show these in spite of its errors."""
+        """Return the goals with reserve: a measurement then still shows these despite errors."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db + db, self.phase_margin_deg + deg, self.ms / factor)
 
@@ -42,7 +42,7 @@ _BALANCED: dict[LoadClass, Goals] = {
 
 
 def goals_for(load: LoadClass, mark: Mark) -> Goals:
-    """Goals of a load class: robust asks for more margin, fast accepts less."""
+    """Return the goals of a load class: robust requires more margin, fast accepts less."""
     base = _BALANCED[load]
     if mark == "robust":
         return Goals(base.gain_margin_db + 3.0, base.phase_margin_deg + 7.0, base.ms - 0.25)
@@ -53,7 +53,7 @@ def goals_for(load: LoadClass, mark: Mark) -> Goals:
 
 @dataclass(frozen=True)
 class Worst:
-    """The worst over all loops [shifts, lines] that were looked at."""
+    """The worst margins over all evaluated loops [shifts, lines]."""
 
     gain_margin_db: float
     phase_margin_deg: float
@@ -61,7 +61,7 @@ class Worst:
     stable: bool
 
     def meets(self, goals: Goals) -> bool:
-        """Whether everything is at least as good as asked for."""
+        """Whether the loops are stable and every margin meets its goal."""
         return (
             self.stable
             and self.gain_margin_db >= goals.gain_margin_db
@@ -71,13 +71,13 @@ class Worst:
 
     @property
     def guaranteed(self) -> Goals:
-        """What is guaranteed: these less the reserve."""
+        """The guaranteed margins: these less the reserve."""
         db, deg, factor = RESERVE
         return Goals(self.gain_margin_db - db, self.phase_margin_deg - deg, self.ms * factor)
 
 
 def worst_of(loops: ComplexArray) -> Worst:
-    """Margins of open loops [shifts, lines], read on their dense grid."""
+    """Return the worst margins of open loops [shifts, lines] on their dense grid."""
     size = loops.real**2 + loops.imag**2
     over = size > 1.0
     row, line = np.nonzero(over[:, 1:] != over[:, :-1])
@@ -85,7 +85,7 @@ def worst_of(loops: ComplexArray) -> Worst:
     if row.size:
         ends = np.concatenate([loops[row, line], loops[row, line + 1]])
         phase_margin = float(np.degrees(np.min(np.abs(np.angle(-ends)))))
-    # Passing the negative real axis: the interpolated size there.
+    # Crossings of the negative real axis: the magnitude there is interpolated.
     real, imag = loops.real, loops.imag
     flips = (imag[:, 1:] > 0) != (imag[:, :-1] > 0)
     row, line = np.nonzero(flips & (real[:, 1:] < 0) & (real[:, :-1] < 0))
@@ -101,14 +101,14 @@ def worst_of(loops: ComplexArray) -> Worst:
 
 
 def sensitivity_peak(loops: ComplexArray) -> float:
-    """Ms, the largest |1/(1 + L)| of all."""
+    """Return Ms, the largest |1/(1 + L)| of all loops."""
     return float(1.0 / np.sqrt(np.min((1.0 + loops.real) ** 2 + loops.imag**2)))
 
 
 def stable(loops: ComplexArray) -> BoolArray:
-    """Nyquist per row: followed down from the top, 1 + L must not have wound round the origin."""
+    """Apply the Nyquist criterion per row: followed from the top, 1 + L must not encircle 0."""
     real, imag = 1.0 + loops.real, loops.imag
-    # Followed upwards it turns by whole turns where it passes left of the origin.
+    # Followed upwards, each passage left of the origin counts as a whole turn.
     above = imag >= 0.0
     row, line = np.nonzero(above[:, 1:] != above[:, :-1])
     side = real[row, line] * imag[row, line + 1] - imag[row, line] * real[row, line + 1]
@@ -119,7 +119,7 @@ def stable(loops: ComplexArray) -> BoolArray:
     return np.asarray((end > -270.0) & (end < 90.0))
 
 
-#: A torque at its limit acts like less gain, down to this share.
+#: A saturated torque acts like a reduced gain, down to this share.
 _LESS_GAIN = np.geomspace(0.02, 0.9, 10)
 
 

@@ -1,11 +1,11 @@
-"""Which notches and filters let the gain of a speed loop go highest.
+"""Search for the notches and filters that permit the highest gain of a speed loop.
 
-Greedy in the number of notches: the best of a family of shapes is added, then all are moved
+Greedy in the number of notches: the best of a family of shapes is added, then all are varied
 together (a pattern search, Hooke & Jeeves 1961, and random steps, Rechenberg 1973) as long as the
-design gets better. A further notch need not be worth anything where it is begun: the notches before
-it were shaped for a loop without it, and whether some seed was worth a per cent decided by noise
-between one notch and two. A shape is judged by the highest gain that keeps the goals for everything
-that the axis may be, so most shapes are refused by a single look at the sensitivity.
+design improves. A further notch need not be an improvement at its start: the notches before it were
+shaped for a loop without it, and a threshold there would let noise decide between one notch and
+two. A shape is rated by the highest gain that meets the goals for every plant that the axis may be;
+most shapes are rejected by the peak sensitivity alone.
 """
 
 from __future__ import annotations
@@ -32,30 +32,29 @@ from backend.analysis.thresholds import loop_search as threshold
 INTEGRAL_RATIO = threshold.INTEGRAL_RATIO
 BEGUN = threshold.BEGUN
 TRIED_AT_LAST = threshold.TRIED_AT_LAST
-#: Where the gain below a bandwidth is looked at, as logarithms of shares of it.
+#: Where the gain below a bandwidth is evaluated, as logarithms of shares of it.
 _DECADE = np.linspace(-np.log(10.0), 0.0, 24)
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Everything of the loop but its gain; ``choice`` counts in the drive's filters."""
+    """The loop apart from its gain; ``choice`` is the index of the drive's filter setting."""
 
     notches: tuple[Notch, ...] = ()
     choice: int = 0
 
     @property
     def price(self) -> float:
-        """What is left of a bandwidth after paying for the parts."""
+        """Share of a bandwidth left after the cost of the notches and the filter choice."""
         return 1.0 - threshold.PRICE * (len(self.notches) + self.choice)
 
 
 @dataclass(frozen=True)
 class Found:
-    """A shape with the highest gain that keeps the goals, as a bandwidth; 0 where none does.
+    """A shape with its highest permitted gain, as a bandwidth; 0 where no gain meets the goals.
 
-    ``merit`` is what it is worth: the gain that is left within its bandwidth behind the notches,
-    without what its parts cost. A notch there that takes as much as it lets the gain rise is
-    worth nothing.
+    ``merit`` is that bandwidth times the gain that the notches leave in the decade below it, less
+    the cost of the parts. A notch there that takes as much gain as it permits to add has no value.
     """
 
     shape: Shape
@@ -65,9 +64,9 @@ class Found:
 
 @dataclass
 class LoopSearch:
-    """One axis: what it may be, the drive's loop, and what the drive makes of a notch.
+    """Search for one axis: possible plants, the drive's loop, and the response of a realised notch.
 
-    ``notch_response`` raises ValueError for a notch that the drive cannot make.
+    ``notch_response`` raises ValueError for a notch that the drive cannot realise.
     """
 
     plant: MeasuredPlant
@@ -90,7 +89,9 @@ class LoopSearch:
         )
 
     def fixed(self, shape: Shape) -> ComplexArray | None:
-        """Filters, notches, current loop and delay; None where the drive cannot make them."""
+        """Return filters, notches, current loop and delay; None if the drive cannot
+        realise them.
+        """
         total = self._fixed[shape.choice]
         for notch in shape.notches:
             made = self._notch(notch)
@@ -108,19 +109,19 @@ class LoopSearch:
         return self._made[notch]
 
     def loops_at(self, fixed: ComplexArray, bandwidth_hz: float) -> ComplexArray:
-        """Open speed loops [shifts, lines] at a gain."""
+        """Return the open speed loops [shifts, lines] at this bandwidth."""
         corner = TURN * bandwidth_hz / INTEGRAL_RATIO
         pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s)
         return np.asarray(self._shifts * (fixed * pi))
 
     def worst(self, shape: Shape, bandwidth_hz: float) -> Worst:
-        """Worst margins of a shape that the drive can make."""
+        """Return the worst margins of a shape that the drive can realise."""
         fixed = self.fixed(shape)
         assert fixed is not None
         return worst_of(self.loops_at(fixed, bandwidth_hz))
 
     def _keeps(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
-        # What some of the lines refuse need not be looked at on all of them.
+        # A shape that fails on some of the lines need not be evaluated on all of them.
         corner = TURN * bandwidth_hz / INTEGRAL_RATIO
         pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s[:: threshold.SOME])
         if sensitivity_peak(self._some * (fixed[:: threshold.SOME] * pi)) > goals.ms:
@@ -133,12 +134,13 @@ class LoopSearch:
         return kept and stable_with_less_gain(self.loops_at(fixed, bandwidth_hz))
 
     def highest(self, shape: Shape, goals: Goals, above_hz: float = 0.0) -> float:
-        """Highest bandwidth that keeps the goals; 0 where that is not above ``above_hz``."""
+        """Return the highest bandwidth that meets the goals; 0 if it is not above ``above_hz``."""
         fixed = self.fixed(shape)
         lowest = max(above_hz * (1.0 + threshold.RESOLUTION), threshold.LOWEST_HZ)
         if fixed is None or lowest > self._highest:
             return 0.0
-        # From the top: where a resonance crosses the limit a higher gain may keep the goals again.
+        # Search from the top: above a gain at which a resonance fails, a higher one may meet the
+        # goals.
         count = 2 + int(np.log(self._highest / lowest) / np.log(threshold.COARSE))
         levels = np.geomspace(lowest, self._highest, count)
         good = next(
@@ -153,7 +155,7 @@ class LoopSearch:
         return low if self._safe(fixed, low, goals) else float(levels[good])
 
     def best(self, goals: Goals, slots: int) -> list[Found]:
-        """The best with no notch, one, two, … as long as each notch earns its place."""
+        """Return the best loops with no notch, one, two, … as long as each is an improvement."""
         best = self._wider(Found(Shape(), 0.0, 0.0), goals)
         kept = [best] if best.bandwidth_hz else []
         for count in range(1, slots + 1):
@@ -170,10 +172,10 @@ class LoopSearch:
         return kept
 
     def shaken(self, found: Found, goals: Goals, tries: int) -> Found:
-        """The best of so many random steps, the same ones each time.
+        """Return the best result of ``tries`` random steps, which are the same on each call.
 
-        What limits the gain is the worst of many loops, so where no single coordinate makes it
-        better two of them may.
+        The gain is limited by the worst of many loops, so a change of two coordinates may improve
+        it where no single one does.
         """
         random, spread = np.random.default_rng(1), 1.0
         at = np.array([_coordinates(notch) for notch in found.shape.notches])
@@ -196,7 +198,7 @@ class LoopSearch:
         return found
 
     def better(self, incumbent: Found, shape: Shape, goals: Goals) -> Found:
-        """The shape with its highest gain where that is worth more, else the incumbent."""
+        """Return the shape with its highest gain if its merit is higher, else the incumbent."""
         worth = shape.price * self._left(shape, incumbent.bandwidth_hz or threshold.LOWEST_HZ)
         if not worth:
             return incumbent
@@ -205,7 +207,7 @@ class LoopSearch:
         return Found(shape, reached, merit) if merit > incumbent.merit else incumbent
 
     def _left(self, shape: Shape, bandwidth_hz: float) -> float:
-        """What notches leave of the gain in the decade below a bandwidth; 0: not possible."""
+        """Gain that the notches leave in the decade below a bandwidth; 0: not realisable."""
         total = 0.0
         grid = np.log(bandwidth_hz) + _DECADE
         for notch in shape.notches:
@@ -223,7 +225,7 @@ class LoopSearch:
         return found
 
     def _seeds(self, given: Shape, count: int) -> Iterator[Shape]:
-        """One notch more than given, and the same shape on all of the highest resonances."""
+        """Shapes with one more notch, and the same notch on all of the highest resonances."""
         ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
         for place in self._places():
             for width in threshold.WIDTHS:
@@ -236,7 +238,7 @@ class LoopSearch:
                         yield replace(given, notches=same)
 
     def _places(self) -> list[float]:
-        """Centres worth a try: about the resonances, or about where the loop ends."""
+        """Candidate notch centres: near the resonances, or near the end of the loop's band."""
         ranked = _ranked(self.plant.model, BEYOND * self.plant.measured_hz)
         places = [factor * hz for hz in ranked[:4] for factor in threshold.PLACES]
         top = threshold.FARTHEST * self.plant.measured_hz
@@ -244,7 +246,7 @@ class LoopSearch:
         return [hz for hz in places if threshold.LOWEST_PLACE_HZ < hz < top]
 
     def _refined(self, found: Found, goals: Goals) -> Found:
-        """Move all notches together as long as the gain rises."""
+        """Vary all notches together as long as the gain rises."""
         for halving in range(threshold.HALVINGS):
             for _ in range(threshold.SWEEPS):
                 before = found
@@ -262,7 +264,7 @@ class LoopSearch:
 
 
 def _coordinates(notch: Notch) -> tuple[float, float, float]:
-    """Logarithms of centre and of width as a share of it, and depth."""
+    """Log centre, log of width over centre, and depth."""
     return np.log(notch.center_hz), np.log(notch.width_hz / notch.center_hz), notch.depth_db
 
 
@@ -271,7 +273,7 @@ def _of(centre: float, ratio: float, depth_db: float) -> Notch:
 
 
 def _moved(notch: Notch, scale: float) -> Iterator[Notch]:
-    """The neighbours of a notch in centre, width and depth."""
+    """Neighbours of a notch in centre, width and depth."""
     centre, width, depth = (scale * x for x in threshold.STEP)
     for sign in (1.0, -1.0):
         factor = (1.0 + centre) ** sign
@@ -285,10 +287,10 @@ def _moved(notch: Notch, scale: float) -> Iterator[Notch]:
 
 
 def _ranked(model: MechanicalModel, highest_hz: float) -> list[float]:
-    """Resonances that rise, the highest first.
+    """Resonances that rise above the rest, highest first.
 
-    A mode above ``highest_hz`` stands for whatever is stiffer than what was measured: where it
-    lies exactly is not known, so it gets no notch.
+    A mode above ``highest_hz`` stands for everything stiffer than what was measured: its exact
+    frequency is not known, so it gets no notch.
     """
     heights = [
         (model.height_db(mode), mode.frequency_hz)

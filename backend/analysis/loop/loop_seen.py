@@ -1,10 +1,10 @@
-"""The plant as a closed loop shows it, where the loop answers otherwise than was predicted.
+"""Corrects the plant by its measured closed loop, where that differs from the prediction.
 
-With backlash an axis is another linear system for every way of driving it: a best linear
+With backlash an axis is a different linear system for every way of driving it: a best linear
 approximation belongs to its class of excitations (Pintelon & Schoukens, *System Identification*,
-2012, section 3.4). What a design needs is the one within its own loop, so identification and design
-take turns (Van den Hof & Schrama, *Identification and control: closed-loop issues*, Automatica 31,
-1995). The controller is known; what the open loop is off by is the plant's.
+2012, section 3.4). A design needs the one within its own loop, so identification and design
+alternate (Van den Hof & Schrama, *Identification and control: closed-loop issues*, Automatica 31,
+1995). The controller is known; the error of the open loop is assigned to the plant.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from backend.analysis.loop.measured_plant import AS_THE_MODEL, MeasuredPlant
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import loop_seen as threshold
 
-#: Lines that are known to less take no part at all.
+#: Lines with a larger deviation than this are not used at all.
 _BLURRED = 2.0 * AS_THE_MODEL
 
 
@@ -32,11 +32,11 @@ class LoopLines:
 
 
 def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArray) -> MeasuredPlant:
-    """The plant, corrected by what its loop showed; it stays what it was where the loop is mute.
+    """Return the plant corrected by its measured loop; unchanged where the loop shows nothing.
 
-    ``controller`` is all of the loop but the plant, on the lines. Where the loop's gain is high its
-    answer is 1, whatever the plant is: log L is known by 1/|1 - T| times what log T is known to.
-    The plant that it was is kept as one that the axis may be as well.
+    ``controller`` is the whole loop but the plant, on the lines. Where the loop gain is high the
+    closed loop is 1 for any plant: the deviation of log L is 1/|1 - T| times that of log T.
+    The uncorrected plant is kept as a further plant that the axis may be.
 
     Raises:
         ValueError: too few lines show the plant better than a model of it would.
@@ -48,7 +48,7 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
     if np.count_nonzero(known) < threshold.LINES:
         raise ValueError("the lines of the loop do not tell the plant")
     ratio = np.log(open_from_closed(lines.closed) / (plant.on(f).response() * controller))
-    # Blurred neighbours keep the mean of the last lines from leaning to one side.
+    # Less accurate neighbours are included so that the mean of the last lines is not one-sided.
     use = scatter < _BLURRED
     x = np.log2(f)
     ratio, scatter = _averaged(x[known], x[use], ratio[use], scatter[use], off[use])
@@ -62,7 +62,7 @@ def seen_in_loop(plant: MeasuredPlant, lines: LoopLines, controller: ComplexArra
 
 
 def _known(octaves: FloatArray, sharp: BoolArray) -> BoolArray:
-    """Sharp lines up to where they become few: single ones among blurred ones are so by chance."""
+    """Accurate lines up to where they become sparse: isolated ones are accurate by chance."""
     near = np.abs(octaves[:, None] - octaves) < threshold.OCTAVES
     dense = np.count_nonzero(near & sharp, axis=1) > threshold.DENSE * near.sum(axis=1)
     last = dense.size if np.all(dense) else int(np.argmin(dense))
@@ -76,7 +76,7 @@ def _averaged(
     scatter: FloatArray,
     off: FloatArray,
 ) -> tuple[ComplexArray, FloatArray]:
-    """A straight line through the neighbours of each centre, and what is left of their scatter."""
+    """Local straight-line fit at each centre, and its remaining scatter."""
     out = np.empty(centres.size, dtype=np.complex128)
     left = np.empty(centres.size)
     for i, centre in enumerate(centres):
@@ -86,7 +86,7 @@ def _averaged(
         total, first = weight.sum(), weight @ x[near]
         second = weight @ x[near] ** 2
         spread = total * second - first**2
-        # Too few neighbours for a slope.
+        # Too few neighbours for a slope: use the mean.
         flat = spread <= 1e-3 * total * second
         row = weight / total if flat else weight * (second - first * x[near]) / spread
         out[i] = row @ value[near]

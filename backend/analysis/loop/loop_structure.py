@@ -1,5 +1,5 @@
-"""The drive's loop: speed error -> PI -> torque filter -> notches -> current loop and delay ->
-mechanics -> speed filter.
+"""Structure of the drive's loop: speed error -> PI -> torque filter -> notches -> current loop and
+delay -> mechanics -> speed filter.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def continuous_notch(notch: Notch, frequency_hz: FloatArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class LoopFilters:
-    """Corners of the first-order filters that may be set; None means not there, or unknown."""
+    """Corners of the adjustable first-order filters; None means not present, or unknown."""
 
     speed_hz: float | None = None
     torque_hz: float | None = None
@@ -32,10 +32,11 @@ class LoopFilters:
 
 @dataclass(frozen=True)
 class DriveLoops:
-    """The fixed parts of the drive's loop; None means not there.
+    """The fixed parts of the drive's loop; None means not present.
 
-    ``delay_s`` is everything that the loop itself adds: computing, holding the torque, measuring
-    the speed. ``choices`` are other filters that the drive can be given, wider ones later.
+    ``delay_s`` is the total delay of the loop itself: computation, torque hold and speed
+    measurement. ``choices`` are other filter settings of the drive, in order of increasing
+    bandwidth.
     """
 
     current_bandwidth_hz: float
@@ -47,15 +48,15 @@ class DriveLoops:
 
     @property
     def filters(self) -> LoopFilters:
-        """As they are."""
+        """The present filter setting."""
         return LoopFilters(self.speed_filter_hz, self.torque_filter_hz)
 
     def with_filters(self, filters: LoopFilters) -> DriveLoops:
-        """The same loop with other filters."""
+        """Return the same loop with other filters."""
         return replace(self, speed_filter_hz=filters.speed_hz, torque_filter_hz=filters.torque_hz)
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """All fixed parts in series."""
+        """Return the response of all fixed parts in series."""
         return np.asarray(
             lag_response(frequency_hz, self.current_bandwidth_hz)
             * lag_response(frequency_hz, self.torque_filter_hz)
@@ -66,7 +67,8 @@ class DriveLoops:
 
 @dataclass(frozen=True)
 class Gains:
-    """``speed_nms`` Nm per rad/s; ``integral_hz`` corner of the PI; ``position_1_s`` 1/s.
+    """Controller gains: ``speed_nms`` in Nm per rad/s; ``integral_hz`` corner of the PI;
+    ``position_1_s`` in 1/s.
 
     ``speed_bandwidth_hz`` is speed_nms/(2π·J), as drives with a bandwidth convention state it.
     """
@@ -80,7 +82,7 @@ class Gains:
 def speed_loop(
     frequency_hz: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains
 ) -> ComplexArray:
-    """Open speed loop; ``fixed`` contains all filters, notches, current loop and delay."""
+    """Return the open speed loop; ``fixed`` is all filters, notches, current loop and delay."""
     s = 1j * TURN * frequency_hz
     pi = gains.speed_nms * (1.0 + TURN * gains.integral_hz / s)
     return np.asarray(pi * fixed * plant)
@@ -89,7 +91,7 @@ def speed_loop(
 def step_of_closed_loop(
     frequency_hz: FloatArray, closed: ComplexArray, *, duration_s: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Unit step response (time, value) of a closed loop known by its frequency response."""
+    """Return the unit step response (time, value) of a closed loop from its frequency response."""
     resolution = 0.5 / duration_s
     top = float(frequency_hz[-1])
     f = np.arange(0.0, top, resolution)
@@ -97,7 +99,7 @@ def step_of_closed_loop(
     imag = np.interp(f, frequency_hz, closed.imag, left=0.0)
     low = f < frequency_hz[0]
     imag[low] = closed.imag[0] * f[low] / frequency_hz[0]
-    # A cosine taper at the top end keeps the cut from ringing.
+    # A cosine taper at the upper end avoids ringing from the cut-off.
     taper = 0.5 + 0.5 * np.cos(np.pi * np.clip((f / top - 0.7) / 0.3, 0.0, 1.0))
     impulse = np.fft.irfft((real + 1j * imag) * taper)
     value = np.cumsum(impulse)

@@ -1,11 +1,11 @@
-"""What is known of a tuned loop's margins, where they were measured and where they are predicted.
+"""Margins of a tuned loop, measured within the measured band and predicted beyond it.
 
 A closed loop is measured up to a frequency; its last crossover may lie above it. Within the band
 margins are read from the lines, with the interval that the lines' deviations give. Beyond it they
-are those of a set of loops: every plant that the design counts on, moved by what the measured lines
-say of the prediction (gain and delay, with their deviations). A loop is judged by the worst of
+are those of a set of loops: every plant of the design, shifted by the gain and delay (with their
+deviations) by which the measured lines differ from the prediction. The verdict is the worst of
 both. A measurement that shows a gain margin directly (the loop is stable with so much more gain)
-takes those members out of the set that it contradicts.
+removes those loops from the set that contradict it.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from backend.analysis.loop.loop_goals import Goals, sensitivity_peak, stable, wo
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import loop_verdict as threshold
 
-#: Deviations to either side that hold 95 of 100 cases.
+#: Standard deviations to either side of a value that give a 95 % interval.
 _CI95 = 1.96
 
 Coverage = Literal["measured", "gain_steps", "predicted"]
 Missing = Literal[
     "phase_margin", "gain_margin", "peak_sensitivity", "stability", "coverage", "contradiction"
 ]
-#: What a figure that misses is: the stated value, or the worst end of the interval of one band.
+#: Origin of a figure that misses its limit: the stated value, or the worst interval end of a band.
 End = Literal["stated", "measured", "predicted"]
 WORST_DEG = threshold.WORST_DEG
 WORST_DB = threshold.WORST_DB
 _WORST_RATIO = 10 ** (WORST_DB / 20.0)
-#: A logarithm of a size in dB.
+#: Converts the natural logarithm of a magnitude to dB.
 _IN_DB = 20.0 / float(np.log(10.0))
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A value and the limits that hold the truth in 95 of 100 cases."""
+    """A value with its 95 % interval."""
 
     value: float
     low: float
@@ -48,8 +48,8 @@ class Interval:
 class BandVerdict:
     """Margins over one band, in degrees and dB; None where nothing crosses there.
 
-    ``peak_sensitivity`` is the largest |S| within the band: it may be below 1 there, and is no
-    peak sensitivity of the loop then (Bode's integral puts that above 1).
+    ``peak_sensitivity`` is the largest |S| within the band: it may be below 1 there and is then not
+    the peak sensitivity Ms of the loop (by Bode's integral that is above 1).
     """
 
     low_hz: float
@@ -61,7 +61,7 @@ class BandVerdict:
 
 @dataclass(frozen=True)
 class Missed:
-    """One figure that is worse than asked for; ``end`` shows which one of its interval."""
+    """One figure that misses its limit; ``end`` is the part of its interval that does."""
 
     what: Missing
     value: float
@@ -73,14 +73,14 @@ class Missed:
 class LoopVerdict:
     """``measured`` over its band, ``predicted`` beyond it, and the worst case of both.
 
-    ``last_crossover_hz`` is the highest of all loops that are possible. ``coverage``: all crossings
-    are measured; or those beyond the band are bounded by a gain that was raised by
-    ``shown_gain_db``; or they are predicted, which keeps no design. ``stated`` are the worst
-    figures of both bands, ``worst`` the ends of their intervals; None where no crossing is known.
-    ``delay_s`` and ``gain_db`` are what the measured lines add to the prediction.
-    ``designed`` is `predicted` for what the design counts on alone, by which it is kept or not.
-    ``contradicted``: the loop was stable with a raised gain with which none of the possible ones
-    is, so that nothing is known beyond the band.
+    ``last_crossover_hz`` is the highest crossover of all possible loops. ``coverage``: all
+    crossings are measured; or those beyond the band are bounded by a measurement with the gain
+    raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
+    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals;
+    60 dB and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the
+    prediction by the measured lines. ``designed`` is `predicted` for the plants of the design
+    alone; it decides whether the design is kept. ``contradicted``: the loop was stable with a
+    raised gain at which none of the possible ones is, so that nothing is known beyond the band.
     """
 
     measured: BandVerdict | None
@@ -99,10 +99,11 @@ class LoopVerdict:
     def missed(
         self, guaranteed: Goals, margin_deg: float, margin_db: float, ms_ratio: float
     ) -> tuple[Missed, ...]:
-        """What is worse than guaranteed, less what a margin may be off by; empty where all is kept.
+        """Return the figures that miss the guaranteed ones by more than the tolerances; empty if
+        none.
 
-        The stated figures must reach the goals but for that. The worst ends of the intervals, of
-        each band, must not be more than `WORST_DEG` or `WORST_DB` below it.
+        The stated figures must reach the goals within the tolerances. The worst ends of the
+        intervals of each band must not be more than `WORST_DEG` or `WORST_DB` below them.
         """
         found = []
         if self.contradicted:
@@ -130,7 +131,7 @@ class LoopVerdict:
 
 
 def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed]:
-    """The worst ends of a band's intervals that are too far below a guaranteed value."""
+    """Interval ends of a band that are too far below a guaranteed value."""
     if band is None:
         return []
     found = []
@@ -146,7 +147,7 @@ def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed
 
 @dataclass(frozen=True)
 class Lines:
-    """A measured closed loop [n]; ``deviation`` (one) is that of its logarithm, per component."""
+    """A measured closed loop [n]; ``deviation`` (one sigma) of its logarithm, per component."""
 
     frequency_hz: FloatArray
     closed: ComplexArray
@@ -164,14 +165,14 @@ def judge(
     size: tuple[float, float] | None = None,
     alternatives: ComplexArray | None = None,
 ) -> LoopVerdict:
-    """The verdict on a loop.
+    """Return the verdict on a loop.
 
-    ``loops`` [m, n] on the dense grid ``frequency_hz`` are all that the loop may be, ``nominal``
-    [n] the one that was measured as predicted. ``lines`` None: nothing was measured. ``late_s`` and
-    ``size`` (logarithm) are what the measured lines show the loop to have beyond its prediction,
-    each with its deviation; None where they show nothing. ``alternatives`` [k, n] are loops that no
-    design counts on and no measurement excludes above its band: where a raised gain excludes none
-    of them either, they widen what is stated there.
+    ``loops`` [m, n] on the dense grid ``frequency_hz`` are all loops that may be the real one,
+    ``nominal`` [n] the predicted one. ``lines`` None: nothing was measured. ``late_s`` and ``size``
+    (logarithm) are delay and gain of the measured lines beyond the prediction, each with its
+    deviation; None where they show nothing. ``alternatives`` [k, n] are loops that the design does
+    not include and no measurement excludes above its band: where a raised gain does not exclude
+    them either, they widen the stated intervals there.
     """
     measured, top = None, 0.0
     if lines is not None and lines.frequency_hz.size >= threshold.FEW:
@@ -180,14 +181,15 @@ def judge(
         _known(late_s, threshold.LATE_S, threshold.UNSEEN_S),
         _known(size, threshold.SIZE, threshold.UNSEEN),
     )
-    # What is measured makes a prediction worse where it is, and never better beyond it.
+    # The measured delay may worsen the prediction beyond the band, but never improve it.
     delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, threshold.LATE_S))
     possible = _moved(frequency_hz, loops, gain, delay)
     contradicted = False
     if shown_gain_db is not None:
         more = possible * 10 ** (shown_gain_db / 20.0)
         left = possible[np.asarray(stable(more))]
-        # Where nothing in the set explains what was seen, the set is wrong, and shows nothing.
+        # If no loop of the set explains the measurement, the set is wrong and supports no
+        # statement.
         contradicted = not left.size
         possible = possible if contradicted else left
     over = np.abs(possible) > 1.0
@@ -217,7 +219,7 @@ def _in_db(size: Interval) -> Interval:
 
 
 def _measured(lines: Lines) -> BandVerdict:
-    """Margins of the measured lines; S = 1 - T is known to |T| times what T's logarithm is."""
+    """Margins of the measured lines; the deviation of S = 1 - T is |T| times that of log T."""
     f, closed = lines.frequency_hz, lines.closed
     loop = closed / (1.0 - closed)
     apart = lines.deviation * np.abs(closed)
@@ -251,7 +253,9 @@ def _measured(lines: Lines) -> BandVerdict:
 
 
 def _least(margins: list[Interval]) -> Interval | None:
-    """The smallest of several margins: another one than the smallest value may have its low end."""
+    """Smallest of several margins, for value and interval ends separately: the lowest end need not
+    belong to the lowest value.
+    """
     if not margins:
         return None
     return Interval(
@@ -260,12 +264,12 @@ def _least(margins: list[Interval]) -> Interval | None:
 
 
 def _share(before: float, after: float) -> float:
-    """Where between two values of opposite sign zero lies, 0 to 1."""
+    """Fraction (0 to 1) of the way between two values of opposite sign at which zero lies."""
     return 0.5 if before == after else float(np.clip(before / (before - after), 0.0, 1.0))
 
 
 def _known(found: tuple[float, float] | None, least: float, unseen: float) -> Interval:
-    """A value by its deviation, but never better known than ``least``; else within ``unseen``."""
+    """Interval of a value from its deviation, at least ``least``; without a value, ``unseen``."""
     if found is None:
         return Interval(0.0, -least, unseen)
     value, std = found
@@ -276,9 +280,9 @@ def _known(found: tuple[float, float] | None, least: float, unseen: float) -> In
 def _moved(
     frequency_hz: FloatArray, loops: ComplexArray, size: Interval, late_s: Interval
 ) -> ComplexArray:
-    """Every loop with sizes and delays from end to end of what they may be.
+    """Every loop with gains and delays over their whole intervals.
 
-    Those between the ends count where a raised gain excludes the ends.
+    Intermediate values are needed where a raised gain excludes the ends.
     """
     turn = -2j * np.pi * frequency_hz
     rows = [
@@ -292,11 +296,12 @@ def _moved(
 def excluding_db(
     verdict: LoopVerdict, frequency_hz: FloatArray, loops: ComplexArray, guaranteed: Goals
 ) -> float:
-    """The gain that no loop is stable with that misses the guaranteed margin; 0 where none misses
-    it.
+    """Return the gain [dB] at which no loop that misses the guaranteed margins is stable; 0 where
+    none misses them.
 
-    ``loops`` as in `judge`. A loop misses it by more than the worst end of an interval may. A loop
-    that is stable with more gain than that, in dB, is none of them.
+    ``loops`` as in `judge`. A loop misses a margin if it is below it by more than the worst end of
+    an interval may be. A loop that is stable with more gain than returned is therefore none of
+    them.
     """
     size = Interval(*(getattr(verdict.gain_db, e) / _IN_DB for e in ("value", "low", "high")))
     least = 0.0
@@ -316,7 +321,7 @@ def excluding_db(
 def _moved_once(
     frequency_hz: FloatArray, loop: ComplexArray, size: Interval, late_s: Interval
 ) -> ComplexArray:
-    """The nominal loop as the measured lines say."""
+    """The nominal loop with the gain and delay that the measured lines show."""
     moved = loop * np.exp(size.value - 2j * np.pi * frequency_hz * late_s.value)
     return np.asarray(moved)[None, :]
 
@@ -329,10 +334,10 @@ def _beyond(
     per_octave: float = 0.0,
     shown_gain_db: float | None = None,
 ) -> BandVerdict | None:
-    """Margins above what was measured: of the nominal loop, and the worst that is possible.
+    """Margins above the measured band: of the nominal loop, and the worst of the possible loops.
 
-    A gain margin is less certain by ``per_octave`` (logarithm); what a raised gain has shown is
-    certain.
+    The uncertainty of a gain margin grows by ``per_octave`` (logarithm); a gain margin shown by a
+    raised gain is certain.
     """
     use: BoolArray = frequency_hz >= from_hz
     if np.count_nonzero(use) < 2:

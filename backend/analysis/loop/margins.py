@@ -1,4 +1,4 @@
-"""Open and closed loops, and the numbers read from them.
+"""Open and closed loops, their margins and bandwidths.
 
 Everything works on measured lines; crossings are interpolated in log frequency. Definitions as
 in Åström & Murray, *Feedback Systems* (2nd ed. 2021), chapters 10 and 12.
@@ -14,23 +14,25 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, magnitude_
 
 
 def open_from_closed(closed: ComplexArray) -> ComplexArray:
-    """L = T / (1 - T)."""
+    """Return L = T / (1 - T)."""
     return np.asarray(closed / (1.0 - closed), dtype=np.complex128)
 
 
 def closed_from_open(loop: ComplexArray) -> ComplexArray:
-    """T = L / (1 + L)."""
+    """Return T = L / (1 + L)."""
     return np.asarray(loop / (1.0 + loop), dtype=np.complex128)
 
 
 def sensitivity(loop: ComplexArray) -> ComplexArray:
-    """S = 1 / (1 + L)."""
+    """Return S = 1 / (1 + L)."""
     return np.asarray(1.0 / (1.0 + loop), dtype=np.complex128)
 
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Where a closed loop first falls by 3 dB and first lags by 90°; None beyond the data."""
+    """Frequencies of a closed loop's first fall by 3 dB and first lag of 90°; None
+    beyond the data.
+    """
 
     minus_3db_hz: float | None
     minus_90deg_hz: float | None
@@ -38,12 +40,12 @@ class Bandwidth:
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of an open loop; None where the data hold no such crossing.
+    """Margins of an open loop; None where the data contain no such crossing.
 
     ``crossover_hz`` is the last fall through 0 dB. ``phase_margin_deg`` is the smallest over all
-    crossings of 0 dB: below zero only where the loop is not stable, as a loop may pass the critical
-    point on either side; ``gain_margin_db`` the smallest *increase* of gain that reaches the
-    critical point. ``ms`` is the peak of |S| at ``ms_hz``.
+    crossings of 0 dB; it is negative only where the loop is unstable, as a stable loop may pass the
+    critical point on either side. ``gain_margin_db`` is the smallest *increase* of gain that
+    reaches the critical point. ``ms`` is the peak of |S| at ``ms_hz``.
     """
 
     crossover_hz: float | None
@@ -73,11 +75,11 @@ def _at(frequency_hz: FloatArray, value: FloatArray, where_hz: float) -> float:
 
 
 def bandwidth(frequency_hz: FloatArray, closed: ComplexArray) -> Bandwidth:
-    """-3 dB and -90° bandwidth of a closed loop, counted from 0 dB.
+    """Return the -3 dB and -90° bandwidth of a closed loop, relative to 0 dB.
 
-    0 dB is what a drive's loop comes to at standstill; a lowest line rises above it where the
-    integral overshoots, the more the further up it lies. It must lie well inside the bandwidth;
-    its phase is treated as the principal value.
+    0 dB is the gain of a drive's closed loop at 0 Hz; the lowest measured line is above it where
+    the integral action overshoots, the more the higher that line lies. The lowest line must lie
+    well inside the bandwidth; its phase is taken as the principal value.
     """
     db = magnitude_db(closed)
     phase = phase_deg(closed)
@@ -89,7 +91,7 @@ def bandwidth(frequency_hz: FloatArray, closed: ComplexArray) -> Bandwidth:
 
 
 def is_stable(frequency_hz: FloatArray, loop: ComplexArray) -> bool:
-    """Nyquist's criterion on data, for a loop without unstable open-loop poles.
+    """Apply the Nyquist criterion to data, for a loop without unstable open-loop poles.
 
     Followed down from the highest line (|L| small, so 1 + L near 1), the phase of 1 + L must end
     near that of L itself at the lowest line, within (-270°, 90°): up to two integrators. Lines
@@ -105,7 +107,7 @@ def is_stable(frequency_hz: FloatArray, loop: ComplexArray) -> bool:
 
 
 def margins(frequency_hz: FloatArray, loop: ComplexArray) -> Margins:
-    """All margins of an open loop measured or computed on ``frequency_hz`` (ascending)."""
+    """Return all margins of an open loop given on ``frequency_hz`` (ascending)."""
     db = magnitude_db(loop)
     phase = phase_deg(loop)
     gain_crossings = _crossings(frequency_hz, db)

@@ -1,4 +1,4 @@
-"""The mechanics on a dense grid: measured where there are lines, the model elsewhere."""
+"""The mechanics on a dense grid: measured near the measured lines, the model elsewhere."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from backend.analysis.thresholds import measured_plant as threshold
 FREQUENCY_FACTORS = threshold.FREQUENCY_FACTORS
 DAMPING_FACTORS = threshold.DAMPING_FACTORS
 BEYOND = threshold.BEYOND
-#: A line that is known to this (one deviation of its logarithm) shows as much as the model there:
-#: so much does a mode that is off by a per cent turn the lines next to it.
+#: A line with this standard deviation of its logarithm is as accurate as the model there: an error
+#: of one per cent in a mode's frequency turns the lines next to it by as much.
 AS_THE_MODEL = np.radians(10.0)
 
 
 @dataclass(frozen=True)
 class MeasuredPlant:
-    """Torque to velocity on ``frequency_hz`` [lines].
+    """Response from torque to velocity on ``frequency_hz`` [lines].
 
-    ``measured_hz`` is the highest measured line. ``variants`` are mechanics that the axis may be
-    as well, such as the motor alone within a backlash: a design must hold for them, too.
+    ``measured_hz`` is the highest measured line. ``variants`` are other mechanics that the axis may
+    have, such as the motor alone within the backlash: a design must hold for them, too.
     """
 
     frequency_hz: FloatArray
@@ -34,10 +34,12 @@ class MeasuredPlant:
     measured_hz: float
     variants: tuple[MechanicalModel, ...] = ()
     also: ComplexArray | None = None
-    """Responses [m, lines] that the axis has under other conditions."""
+    """Responses [m, lines] of the axis under other conditions."""
 
     def response(self, frequency_factor: float = 1.0, damping_factor: float = 1.0) -> ComplexArray:
-        """Response with all modes moved; the measured deviation from the model stays."""
+        """Return the response with all modes shifted; keeps the measured deviation
+        from the model.
+        """
         moved = self.model.perturbed(1.0, damping_factor)
         modes = tuple(
             replace(
@@ -50,22 +52,22 @@ class MeasuredPlant:
         return np.asarray(moved.response(self.frequency_hz) * self.correction)
 
     def _uncertainty(self, mode_hz: float) -> int:
-        """How many times a shift counts for a mode here."""
+        """Multiplicity of a shift for a mode at this frequency: larger beyond the measured band."""
         if mode_hz <= self.measured_hz:
             return 1
         return 2 if mode_hz <= BEYOND * self.measured_hz else 4
 
     def shifted(self) -> ComplexArray:
-        """Everything that the axis may be, [shifts, lines]."""
+        """Return all responses that the axis may have, [shifts, lines]."""
         moves = list(product(FREQUENCY_FACTORS, DAMPING_FACTORS)) if self.model.modes else [(1, 1)]
         rows = [self.response(*move) for move in moves]
         rows += [v.response(self.frequency_hz) for v in self.variants]
         return np.array([*rows, *(self.also if self.also is not None else ())])
 
     def motor_alone_above(self, motor_inertia_kgm2: float) -> ComplexArray:
-        """The response where the motor turns alone above the highest measured line.
+        """Return the response if only the motor moves above the highest measured line.
 
-        Whatever hangs on it lets go of it there: no mode above the band is known to be one.
+        The load may decouple there: whether a mode above the band exists is not known.
         """
         f = self.frequency_hz
         nominal = self.response()
@@ -76,7 +78,7 @@ class MeasuredPlant:
         return np.asarray(nominal * np.exp(share * np.log(alone / nominal)))
 
     def on(self, frequency_hz: FloatArray) -> MeasuredPlant:
-        """The same on other lines, ascending; without what it is under other conditions."""
+        """Return the plant on other lines (ascending), without variants and other conditions."""
         x, xp, turns = np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.correction)
         joined = np.interp(x, xp, turns.real) + 1j * np.interp(x, xp, turns.imag)
         return replace(
@@ -93,10 +95,11 @@ def measured_plant(
     variants: tuple[MechanicalModel, ...] = (),
     fitted: bool = True,
 ) -> MeasuredPlant:
-    """Join a corrected measurement with its model.
+    """Combine a corrected measurement with its model.
 
-    A model that is ``fitted`` to all lines counts next to each of them by how exactly that line is
-    known: one that friction or noise hides would else decide a design by its error.
+    With ``fitted``, the model was fitted to all lines: next to each line it is weighted by the
+    accuracy of that line. Otherwise a line hidden by friction or noise would determine a design by
+    its error.
 
     The ratio measurement/model is smooth, so it may be interpolated between lines where the
     response itself may not; outside the measured band it fades to 1 within a third of an octave.
@@ -121,9 +124,9 @@ def measured_plant(
 
 
 def _own_share(frf: Frf) -> FloatArray:
-    """What a line says against a model of all lines, 0 to 1, by the variances of both.
+    """Weight of a line against a model of all lines, 0 to 1, from the variances of both.
 
-    A deviation that is not known, as of a single period, is no reason against a line.
+    A line with unknown deviation, as from a single period, has the full weight.
     """
     parts = (np.log(10.0) / 20.0 * frf.std_db, np.radians(frf.std_deg))
     variance = 0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts)

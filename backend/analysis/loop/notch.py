@@ -1,6 +1,6 @@
-"""Notch filters: one vendor-neutral form, and what each drive makes of it.
+"""Notch filters: one vendor-neutral form, and its encodings in each drive.
 
-A notch is its centre, its -3 dB bandwidth and its depth, H(s) = (s² + d·g·s + w²)/(s² + g·s + w²)
+A notch has a centre, a -3 dB bandwidth and a depth, H(s) = (s² + d·g·s + w²)/(s² + g·s + w²)
 with w = 2π·f_c, g = 2π·f_b, d = 10^(depth/20). Encodings follow tuning.md section 4; MMS7's
 formulas are equations (15) to (18) of its manual (004:3495), read as explained there.
 """
@@ -24,8 +24,8 @@ COEFFICIENT_OFFSET = 32_768
 class Notch:
     """Centre (Hz), -3 dB bandwidth (Hz) and depth (dB, negative: gain at the centre).
 
-    A notch of less than 10 dB is -3 dB over less than that: the bandwidth then lies where the power
-    is half-way between the centre's and what is passed.
+    The -3 dB bandwidth of a notch shallower than 10 dB is smaller than the value: the bandwidth is
+    then taken where the power is half-way between that of the centre and that of the passband.
     """
 
     center_hz: float
@@ -39,7 +39,7 @@ class Notch:
             raise ValueError(f"notch depth {self.depth_db} dB would amplify; use 0 or less")
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Continuous-time response."""
+        """Return the continuous-time response."""
         s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
         w, g = TURN * self.center_hz, TURN * self.width_hz
         d = 10.0 ** (self.depth_db / 20.0)
@@ -58,9 +58,9 @@ class NotchCoefficients:
 
 @dataclass(frozen=True)
 class RealisedNotch:
-    """What a drive will really do: where its gain is least, how deep, and what it adds.
+    """The notch as the drive realises it: frequency of the lowest gain, width and depth.
 
-    ``dc_gain_db`` is the gain at 0 Hz, which rounding can move; ``stable`` is False when the
+    ``dc_gain_db`` is the gain at 0 Hz, which rounding can change; ``stable`` is False when the
     rounded filter has a pole on or outside the unit circle and must not be written.
     """
 
@@ -72,7 +72,7 @@ class RealisedNotch:
 
 
 def _stored(coefficient: float) -> int:
-    # Python rounds halves to even; the formula means the nearest step, halves upwards.
+    # Python rounds halves to even; the manual's formula rounds halves up.
     value = int(np.floor(coefficient * COEFFICIENT_SCALE + 0.5)) + COEFFICIENT_OFFSET
     if not 0 <= value <= 0xFFFF:
         raise ValueError(f"notch coefficient {coefficient:.4f} does not fit into 16 bits")
@@ -80,9 +80,11 @@ def _stored(coefficient: float) -> int:
 
 
 def encode_coefficients(notch: Notch, sample_time_s: float) -> NotchCoefficients:
-    """MMS7 2008h: a1 = w² + d·g - 2, a2 = 1 - d·g, b1 = w² + g - 2, b2 = 1 - g, w and g times ts.
+    """Encode MMS7 2008h: a1 = w² + d·g - 2, a2 = 1 - d·g, b1 = w² + g - 2, b2 = 1 - g, w and g
+    times ts.
 
-    Raises ValueError where a coefficient leaves the 16 bits or the rounded filter is not stable.
+    Raises:
+        ValueError: a coefficient exceeds 16 bits, or the rounded filter is not stable.
     """
     w, g = TURN * notch.center_hz * sample_time_s, TURN * notch.width_hz * sample_time_s
     d = 10.0 ** (notch.depth_db / 20.0)
@@ -101,7 +103,7 @@ def encode_coefficients(notch: Notch, sample_time_s: float) -> NotchCoefficients
 
 
 def coefficient_values(raw: NotchCoefficients) -> tuple[float, float, float, float]:
-    """(a1, a2, b1, b2) as numbers."""
+    """Return (a1, a2, b1, b2) as numbers."""
     a1, a2, b1, b2 = (
         (value - COEFFICIENT_OFFSET) / COEFFICIENT_SCALE
         for value in (raw.a1, raw.a2, raw.b1, raw.b2)
@@ -110,7 +112,7 @@ def coefficient_values(raw: NotchCoefficients) -> tuple[float, float, float, flo
 
 
 def is_stable(raw: NotchCoefficients) -> bool:
-    """Jury's conditions on z² + b1·z + b2, in whole steps so that rounding cannot hide a pole."""
+    """Check Jury's conditions on z² + b1·z + b2, in integers to exclude rounding errors."""
     b1, b2 = raw.b1 - COEFFICIENT_OFFSET, raw.b2 - COEFFICIENT_OFFSET
     one = COEFFICIENT_SCALE
     return abs(b2) < one and one + b1 + b2 > 0 and one - b1 + b2 > 0
@@ -119,16 +121,17 @@ def is_stable(raw: NotchCoefficients) -> bool:
 def coefficients_response(
     raw: NotchCoefficients, frequency_hz: FloatArray, sample_time_s: float
 ) -> ComplexArray:
-    """Exact discrete response of the rounded filter."""
+    """Return the exact discrete response of the rounded filter."""
     a1, a2, b1, b2 = coefficient_values(raw)
     z = np.exp(1j * TURN * np.asarray(frequency_hz, dtype=np.float64) * sample_time_s)
     return np.asarray((z * z + a1 * z + a2) / (z * z + b1 * z + b2), dtype=np.complex128)
 
 
 def decode_coefficients(raw: NotchCoefficients, sample_time_s: float) -> Notch:
-    """The formulas backwards: f_c, f_b and depth that these coefficients mean.
+    """Return f_c, f_b and depth of these coefficients.
 
-    Raises ValueError for coefficients that are no notch (w² or g not positive).
+    Raises:
+        ValueError: the coefficients are not those of a notch (w² or g not positive).
     """
     _, a2, b1, b2 = coefficient_values(raw)
     w2, g = 1.0 + b1 + b2, 1.0 - b2
@@ -143,7 +146,7 @@ def decode_coefficients(raw: NotchCoefficients, sample_time_s: float) -> Notch:
 
 
 def realised(raw: NotchCoefficients, sample_time_s: float) -> RealisedNotch:
-    """Read the rounded filter's response as one would on a plot; the width as `Notch` means it."""
+    """Read the notch from the rounded filter's response, with the width as defined by `Notch`."""
     a1, a2, b1, b2 = coefficient_values(raw)
     stable = is_stable(raw)
     f = np.geomspace(1.0, 0.499 / sample_time_s, 20_000)
@@ -161,10 +164,10 @@ def realised(raw: NotchCoefficients, sample_time_s: float) -> RealisedNotch:
 
 @dataclass(frozen=True)
 class IntegerRange:
-    """Limits of a raw parameter, inclusive, from the drive's profile, and what its steps mean.
+    """Limits of a raw parameter, inclusive, from the drive's profile, and its scale.
 
     A value is ``raw * scale + offset``: in Hz for frequencies and widths, in dB of attenuation for
-    depths, a level by itself.
+    depths, or a dimensionless level.
     """
 
     low: int
@@ -173,23 +176,26 @@ class IntegerRange:
     offset: float = 0.0
 
     def step(self, value: float) -> int:
-        """Nearest step, allowed or not."""
+        """Return the nearest step, allowed or not."""
         return int(np.floor((value - self.offset) / self.scale + 0.5))
 
     def nearest(self, value: float) -> int:
-        """Nearest allowed step."""
+        """Return the nearest allowed step."""
         return min(max(self.step(value), self.low), self.high)
 
     def value(self, raw: float) -> float:
-        """What a raw value means."""
+        """Return the value of a raw value."""
         # Scales such as 0.1 are not exact in binary.
         return float(f"{raw * self.scale + self.offset:.12g}")
 
 
 def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) -> tuple[int, int]:
-    """M6-L: frequency and width in steps of Hz; depth cannot be chosen.
+    """Encode for M6-L: frequency and width in steps of Hz; the depth is fixed.
 
-    A centre outside the range raises ValueError; the width is moved to the nearest allowed one.
+    The width is moved to the nearest allowed one.
+
+    Raises:
+        ValueError: the centre is outside the range.
     """
     return _frequency(notch, frequency), width.nearest(notch.width_hz)
 
@@ -197,7 +203,7 @@ def encode_hz_width(notch: Notch, frequency: IntegerRange, width: IntegerRange) 
 def encode_hz_width_db(
     notch: Notch, frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
 ) -> tuple[int, int, int]:
-    """DS_C: frequency and width in Hz, depth as attenuation in dB."""
+    """Encode for DS_C: frequency and width in Hz, depth as attenuation in dB."""
     return (
         _frequency(notch, frequency),
         width.nearest(notch.width_hz),
@@ -208,9 +214,10 @@ def encode_hz_width_db(
 def decode_hz_width_db(
     raw: tuple[int, int, int], frequency: IntegerRange, width: IntegerRange, depth: IntegerRange
 ) -> Notch:
-    """Back from Hz, Hz, dB of attenuation.
+    """Decode Hz, Hz, dB of attenuation.
 
-    Raises ValueError for values that are no notch.
+    Raises:
+        ValueError: the values are not those of a notch.
     """
     hz, wide, deep = raw
     return Notch(frequency.value(hz), width.value(wide), -depth.value(deep))
@@ -218,7 +225,7 @@ def decode_hz_width_db(
 
 @dataclass(frozen=True)
 class LevelCalibration:
-    """Measured meaning of width and depth levels: the manual prints no formula (R6L).
+    """Measured effect of width and depth levels, for which the manual prints no formula (R6L).
 
     ``width_ratio`` maps a level to f_b/f_c, ``depth_db`` a level to depth; both from responses
     with and without the notch. Levels in between are interpolated.
@@ -235,7 +242,7 @@ def encode_hz_levels(
     depth: IntegerRange,
     calibration: LevelCalibration,
 ) -> tuple[int, int, int]:
-    """R6L: frequency in Hz and the levels whose measured effect is nearest to what is asked."""
+    """Encode for R6L: frequency in Hz and the levels whose measured effect is nearest."""
     centre = _frequency(notch, frequency)
     share = notch.width_hz / frequency.value(centre)
     ratio = _nearest_level(calibration.width_ratio, share, width)
@@ -245,7 +252,7 @@ def encode_hz_levels(
 def decode_hz_levels(
     centre_hz: float, width_level: int, depth_level: int, calibration: LevelCalibration
 ) -> Notch:
-    """Notch that these levels were measured to make."""
+    """Return the notch with the measured effect of these levels."""
     ratio = _interpolated(calibration.width_ratio, width_level)
     depth = min(0.0, _interpolated(calibration.depth_db, depth_level))
     return Notch(centre_hz, ratio * centre_hz, depth)
@@ -272,7 +279,7 @@ def _nearest_level(
     if not points:
         raise ValueError("the levels have not been measured on this drive yet")
     ordered = sorted(points)
-    # What levels beyond those that were measured do is not known.
+    # The effect of levels outside the measured range is not known.
     low, high = max(allowed.low, ordered[0][0]), min(allowed.high, ordered[-1][0])
     levels = np.arange(low, high + 1)
     known = np.interp(levels, [p[0] for p in ordered], [p[1] for p in ordered])

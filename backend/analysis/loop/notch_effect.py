@@ -1,14 +1,14 @@
-"""What a notch in the path of the torque does, seen in the reported torque. Pure.
+"""Identifies a notch in the torque path from the reported torque.
 
 With no loop closed the same torque is played with and without the notch. The ratio of the two
-reported torques is the notch, blurred by what sampling folds back: the held setpoints contain
-images of every line above half the sample rate, which pass the notch untouched, so that a deep
-notch looks shallow. The shape is therefore fitted through hold and sampling.
+reported torques is the notch, blurred by aliasing: the held setpoints contain images of every line
+above half the sample rate, which pass the notch unchanged, so that a deep notch looks shallow. The
+shape is therefore fitted through hold and sampling.
 
-With a closed speed loop the reference makes the torque. There 1/T = 1/(N·C) + P, where T is the
+With a closed speed loop the reference causes the torque. There 1/T = 1/(N·C) + P, where T is the
 torque per reference, C the controller, N the notch and P the mechanics (Åström & Murray, *Feedback
 Systems*, 2nd ed. 2021, section 12.1). With P read as speed over torque that is T = N·C·(1 - V): the
-speed V is measured, and friction with it, so that no model of the mechanics is needed.
+speed V is measured, friction included, so that no model of the mechanics is needed.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from backend.analysis.thresholds import notch_effect as threshold
 
 @dataclass(frozen=True)
 class NotchEffect:
-    """The notch that explains a measured ratio, and what is left of it (median, relative).
+    """The notch that explains a measured ratio, and the residual (median, relative).
 
     ``deviation`` is the median standard deviation of the lines that were used; 0 where the
-    measurement does not report it.
+    measurement does not state it.
     """
 
     notch: Notch
@@ -47,7 +47,7 @@ class NotchEffect:
 class LoopLines:
     """Torque (Nm) and speed (rad/s) of a closed loop per unit of its reference, [lines].
 
-    With the standard deviations of these means.
+    Means with their standard deviations.
     """
 
     torque: ComplexArray
@@ -57,10 +57,10 @@ class LoopLines:
 
     @staticmethod
     def of(sent: ComplexArray, torque: ComplexArray, velocity: ComplexArray) -> LoopLines:
-        """From spectra of periods: ``sent`` [lines], the others [periods, lines].
+        """Return the means from spectra of periods: ``sent`` [lines], the others [periods, lines].
 
         Raises:
-            ValueError: fewer than two periods, which show nothing of noise.
+            ValueError: fewer than two periods, from which no noise can be estimated.
         """
         if len(torque) < 2:
             raise ValueError("fewer than two whole periods were recorded")
@@ -77,19 +77,19 @@ def _mean_and_deviation(blocks: ComplexArray) -> tuple[ComplexArray, FloatArray]
 
 
 def seen_ratio(notch: Notch, frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """Ratio of the sampled torques with and without a notch."""
+    """Return the ratio of the sampled torques with and without a notch."""
     orders = np.arange(-threshold.IMAGES, threshold.IMAGES + 1)[:, None] * path.sample_rate_hz
     f = frequency_hz[None, :] + orders
     direct = command_response(f, path)
-    # One line's image k carries the phase of the line itself: the sequence is the same.
+    # The image k of a line has the phase of the line itself: the sequence is the same.
     return np.asarray(np.sum(direct * notch.response(f), axis=0) / np.sum(direct, axis=0))
 
 
 def fit_effect(frequency_hz: FloatArray, ratio: ComplexArray, path: SignalPath) -> NotchEffect:
-    """Centre, width and depth behind a measured ratio of sampled torques, with no loop closed.
+    """Fit centre, width and depth to a measured ratio of sampled torques, with no loop closed.
 
     Raises:
-        ValueError: nothing like a notch is seen.
+        ValueError: the ratio shows no notch.
     """
     f = np.asarray(frequency_hz, np.float64)
     one, nothing = np.ones(f.shape, np.complex128), np.zeros(f.shape, np.complex128)
@@ -103,13 +103,15 @@ def fit_effect_in_loop(
     loop: LoopModel,
     path: SignalPath,
 ) -> NotchEffect:
-    """The same with a closed speed loop, ``loop`` being its controller without the notch.
+    """Fit the notch as `fit_effect` with a closed speed loop; ``loop`` is its controller without
+    it.
 
-    What the reference alone makes of torque is the plain torque and what the loop took of it by
-    the speed. Best above the crossover, where the loop takes little.
+    The torque that the reference alone causes is the torque without the notch plus the part that
+    the loop subtracted for the speed. Most accurate above the crossover frequency, where that part
+    is small.
 
     Raises:
-        ValueError: nothing like a notch is seen, or too few lines are known well enough.
+        ValueError: the ratio shows no notch, or too few lines are accurate enough.
     """
     f = np.asarray(frequency_hz, np.float64)
     controller = (
@@ -156,9 +158,9 @@ def fit_effect_in_loop(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Lines of a notched torque: N·forward through hold and sampling, less N·own of the loop.
+    """Lines of a notched torque: N·forward through hold and sampling, minus N·own of the loop.
 
-    ``ratio`` is about the notch itself, for where to begin.
+    ``ratio`` is approximately the notch itself and gives the start values.
     """
 
     frequency_hz: FloatArray
@@ -169,7 +171,7 @@ class _Seen:
     deviation: FloatArray
 
     def rest(self, notch: Notch, path: SignalPath) -> ComplexArray:
-        """What a notch leaves unexplained, relative to the torque without it."""
+        """Return what a notch leaves unexplained, relative to the torque without it."""
         f = self.frequency_hz
         made = seen_ratio(notch, f, path) * self.forward - notch.response(f) * self.own
         return np.asarray(made - self.torque)
@@ -180,7 +182,7 @@ def _fitted(seen: _Seen, path: SignalPath) -> NotchEffect:
     if abs(seen.ratio[lowest]) > threshold.NO_EFFECT:
         raise ValueError("the notch has no effect that can be seen in the torque")
     centre = float(seen.frequency_hz[lowest])
-    # A line that the notch takes nearly all of counts for more, one that noise blurs for less.
+    # Lines that the notch attenuates strongly get more weight, noisy ones less.
     weight = 1.0 / (np.hypot(np.abs(seen.ratio), seen.deviation / 0.05) + 0.05)
 
     def notch_of(x: FloatArray) -> Notch:

@@ -1,10 +1,10 @@
 """Mechanics as a chain of inertias, driven and measured at the first.
 
-Whatever hangs on a motor answers there like such a chain (Gladwell, *Inverse Problems in
+Any load on a motor has the same response there as such a chain (Gladwell, *Inverse Problems in
 Vibration*, 2004, ch. 4: a spectrum and the residues at one end determine it), so inertias,
-stiffnesses and dampings are the fewest numbers that say what is possible and nothing else.
-Parameters x: log J of the motor, log of its viscous friction, two delays and log of the speed
-filter's corner (these are the path's), and per load log J, log k and log d.
+stiffnesses and dampings are the smallest parameter set that covers all possible responses and no
+others. Parameters x: log J of the motor, log of its viscous friction, two delays and log of the
+speed filter's corner (these belong to the path), and per load log J, log k and log d.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ LOAD_PARAMETERS = 3
 
 
 def loads_of(x: FloatArray) -> FloatArray:
-    """Inertia, stiffness and damping [loads, 3] of the parameters."""
+    """Return inertia, stiffness and damping [loads, 3] of the parameters."""
     return np.asarray(np.exp(x[RIGID_PARAMETERS:]).reshape(-1, LOAD_PARAMETERS))
 
 
 def chain_response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Torque to velocity [...] and its slope [n parameters, ...] (zero for the path).
+    """Return the response from torque to velocity [...] and its slopes [n parameters, ...] (zero
+    for the path).
 
-    From the far end towards the motor by impedances: an inertia is sJ, a coupling k/s + d in
-    series with all behind it.
+    Calculated from the far end towards the motor by impedances: an inertia is sJ, a coupling k/s +
+    d in series with everything behind it.
     """
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
     loads = loads_of(x)
@@ -63,7 +64,7 @@ def chain_response_and_slopes(
 
 
 def model_of_chain(x: FloatArray) -> MechanicalModel:
-    """The chain's poles and residues at the motor (always passive, so residues are positive)."""
+    """Return the chain's poles and residues at the motor (passive, so residues are positive)."""
     loads, motor, viscous = loads_of(x), float(np.exp(x[0])), float(np.exp(x[1]))
     n = len(loads)
     size = 1 + 2 * n  # speed of the motor, then per load twist and speed
@@ -85,7 +86,7 @@ def model_of_chain(x: FloatArray) -> MechanicalModel:
 
 
 def _from_poles(poles: ComplexArray, residues: ComplexArray) -> MechanicalModel:
-    """Pairs to modes; real poles to the rigid part (the slowest) and to overdamped modes."""
+    """Pole pairs as modes; real poles as the rigid part (the slowest) and as overdamped modes."""
     real = np.abs(poles.imag) <= 1e-9 * np.maximum(np.abs(poles), 1e-12)
     order = np.flatnonzero(real)[np.argsort(-poles[real].real)]
     rigid, rest = order[0], order[1:]
@@ -113,7 +114,7 @@ def _mode(p: complex, q: complex, a: complex, b: complex) -> Mode:
 
 
 def modal_start(x: FloatArray) -> FloatArray:
-    """Parameters of the free modal form (:func:`mechanical_model.model_of`) for a chain's."""
+    """Return a chain's parameters in the modal form (:func:`mechanical_model.model_of`)."""
     model = model_of_chain(x)
     out = [np.log(model.gain), np.log(max(model.pole_rad_s, 1e-6)), *x[2:RIGID_PARAMETERS]]
     for m in model.modes:
@@ -129,8 +130,10 @@ def modal_start(x: FloatArray) -> FloatArray:
 
 
 def with_load(x: FloatArray, place: int, new: tuple[float, float, float, float]) -> FloatArray:
-    """One more load: ``new`` is what the inertia at ``place`` (0 is the motor) becomes, and J, k
-    and d of the load that hangs on it; what hung there before hangs on the new load.
+    """Return the parameters with one more load.
+
+    ``new`` contains the new inertia at ``place`` (0 is the motor), and J, k and d of the load that
+    is attached to it; everything that was attached there is attached to the new load.
     """
     loads = [tuple(row) for row in loads_of(x)]
     motor = float(np.exp(x[0]))
@@ -145,9 +148,10 @@ def with_load(x: FloatArray, place: int, new: tuple[float, float, float, float])
 def responses_with_load(
     x: FloatArray, place: int, new: FloatArray, frequency_hz: FloatArray
 ) -> ComplexArray:
-    """Responses [n, lines] of `with_load` for many ``new`` [n, 4] at once.
+    """Return the responses [n, lines] of `with_load` for many ``new`` [n, 4] at once.
 
-    As exact as the precision of ``frequency_hz``: to rank very many, single precision does.
+    The precision is that of ``frequency_hz``: single precision suffices for ranking many
+    candidates.
     """
     frequency_hz = np.asarray(frequency_hz)
     s = 1j * TURN * frequency_hz
@@ -178,7 +182,7 @@ def responses_with_load(
 def chain_of_modes(
     gain: float, frequency_hz: FloatArray, residue: FloatArray, viscous: float, damping: float
 ) -> FloatArray:
-    """Parameters (path left zero) of the chain with these undamped modes.
+    """Return the parameters (path left zero) of the chain with these undamped modes.
 
     All couplings get the same damping ratio.
 

@@ -1,7 +1,7 @@
-"""One fit of mechanics and delays to several views of one motion, as least squares.
+"""Least-squares fit of mechanics and delays to several views of one motion.
 
-What is fitted is the logarithm of what sampling shows of a model (`sampled_model`), over what was
-measured; how mechanics are written down in parameters is a `Form`.
+Fitted is the logarithm of the response of a model as sampling shows it (`sampled_model`), over the
+measured one; the parametrisation of the mechanics is a `Form`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ HIGHEST_TRIED = threshold.HIGHEST_TRIED
 
 @dataclass(frozen=True)
 class View:
-    """One estimate of the same mechanics: lines, values, weights, and how it came about."""
+    """One estimate of the same mechanics: lines, values, weights, and its signal path."""
 
     f: FloatArray
     g: ComplexArray
@@ -57,9 +57,9 @@ class View:
         frf: Frf, use: BoolArray, path: SignalPath, loop: LoopModel, floor: float, *,
         integrated: bool, second: bool,
     ) -> View:  # fmt: skip
-        """Weights are those of the lines' accuracy, but nothing is better than the floor.
+        """Return a view with weights from the accuracy of the lines, limited by ``floor``.
 
-        Lines that are not in ``use`` weigh nothing.
+        Lines that are not in ``use`` have weight zero.
         """
         f = frf.frequency_hz
         relative = np.nan_to_num(frf.std_db, nan=0.0) * np.log(10) / 20
@@ -69,7 +69,7 @@ class View:
         return View(f, frf.response, weight, sampler, integrated, second)
 
     def thinned(self, lines: npt.NDArray[np.int64]) -> View:
-        """Some of the lines."""
+        """Return the view with some of the lines."""
         return replace(
             self,
             f=self.f[lines],
@@ -81,7 +81,7 @@ class View:
 
 @dataclass(frozen=True)
 class KnownInertia:
-    """The whole axis' inertia as moves have shown it, and its relative standard deviation."""
+    """Inertia of the whole axis from moves, and its relative standard deviation."""
 
     kgm2: float
     deviation: float = 0.0
@@ -89,20 +89,20 @@ class KnownInertia:
 
 @dataclass(frozen=True)
 class Form:
-    """A way to write mechanics down in parameters: what they mean, their bounds and habits."""
+    """A parametrisation of the mechanics: response, model, bounds and prior."""
 
     response: Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
     model: Callable[[FloatArray], MechanicalModel]
     bounds: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
     prior: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
-    """What is usual: rows that ought to be near zero, and their slopes [rows, parameters]."""
+    """Prior: rows that are normally near zero, and their slopes [rows, parameters]."""
     inertia: Callable[[FloatArray], tuple[float, FloatArray]]
     """Logarithm of the whole inertia (kg·m²), and its slopes [parameters]."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """One solution."""
+    """One solution of a `Problem`."""
 
     x: FloatArray
     jacobian: FloatArray
@@ -123,9 +123,9 @@ class Problem:
     free_filter: bool
     """Whether the drive's speed filter is unknown."""
     anchor: FloatArray | None = None
-    """Delays and filter that a search stays near to as long as mechanics are missing."""
+    """Delays and filter that a search stays near to while the mechanics are incomplete."""
     inertia: KnownInertia | None = None
-    """Where friction hides the lowest lines, nothing else may say anything of it."""
+    """Inertia from moves; the only information on it where friction hides the low lines."""
 
     @cached_property
     def _frequencies(self) -> FloatArray:
@@ -133,7 +133,7 @@ class Problem:
         return self.views[0].sampler.frequency_hz
 
     def logs(self, x: FloatArray) -> tuple[list[ComplexArray], list[ComplexArray]]:
-        """Per view log(seen/measured) [lines] and its slopes [parameters, lines]."""
+        """Return per view log(seen/measured) [lines] and its slopes [parameters, lines]."""
         f = self._frequencies
         plant, slopes = self.form.response(x, f)
         late = delay_response(f, float(x[2]) * self.period_s)
@@ -159,13 +159,15 @@ class Problem:
         return values, gradients
 
     def further(self, x: FloatArray, view: View, f: FloatArray) -> ComplexArray | None:
-        """What lies on the way of this view's signal alone, by the parameters."""
+        """Return the factor in the path of this view's signal alone, for the parameters."""
         if view.integrated:
             return delay_response(f, float(x[3] - x[2]) * self.period_s)
         return lag_response(f, float(np.exp(x[4]))) if self.free_filter else None
 
     def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Weighted logarithmic error, peaks and valleys alike, and its slopes [n, parameters]."""
+        """Return the weighted logarithmic error, the same for peaks and valleys, and its slopes
+        [n, parameters].
+        """
         values, gradients = self.logs(x)
         return self._rows(x, values), self._slopes(x, gradients)
 
@@ -187,7 +189,7 @@ class Problem:
         return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
 
     def _known(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far the whole inertia is from what is known of it [0 or 1], and its slopes."""
+        """Deviation of the whole inertia from the known one [0 or 1 rows], and its slopes."""
         if self.inertia is None:
             return np.zeros(0), np.zeros((0, x.size))
         value, slopes = self.form.inertia(x)
@@ -196,21 +198,21 @@ class Problem:
         return np.array([apart]), np.asarray(slopes[None, :] / known)
 
     def with_views(self, views: tuple[View, ...]) -> Problem:
-        """The same with other views."""
+        """Return the problem with other views."""
         return replace(self, views=views)
 
     def thinned(self, lines: npt.NDArray[np.int64]) -> Problem:
-        """The same with some of the lines, for a first look at many starts."""
+        """Return the problem with some of the lines, for a first evaluation of many starts."""
         return replace(self, views=tuple(view.thinned(lines) for view in self.views))
 
     def solve(self, start: FloatArray, steps: int = 40, *, bound: bool = False) -> Found:
-        """Best parameters near ``start``, as far as ``steps`` evaluations lead.
+        """Return the best parameters near ``start`` within ``steps`` evaluations.
 
-        ``bound`` keeps delays and filter near to the anchor: where mechanics are missing, they
-        would imitate them.
+        ``bound`` keeps delays and filter near the anchor: while mechanics are missing, they would
+        imitate them.
         """
         low, high = self.form.bounds(start, self.views[0].f)
-        # A delay that a start brings along is looked for around it.
+        # Delays are searched for around those of the start.
         low[2:4], high[2:4] = np.maximum(start[2:4] - 1.0, -0.3), start[2:4] + 1.0
         low[4], high[4] = np.log(100.0), np.log(20000.0)
         if bound and self.anchor is not None:
@@ -225,7 +227,7 @@ class Problem:
             steps=steps,
         )
         points = sum(2 * int(np.count_nonzero(view.weight)) for view in self.views)
-        # No data are better than the floor of their weights, whatever synthetic ones are.
+        # Real data are not better than the floor of their weights, as synthetic data may be.
         misfit = max(2 * fit.cost, 1e-6 * points)
         score = points * np.log(misfit / points) + start.size * np.log(points)
         values, _ = self.logs(fit.x)
@@ -238,12 +240,12 @@ class Problem:
 
 
 def robust_rows(residuals: FloatArray) -> FloatArray:
-    """Weights of rows as the robust loss has them."""
+    """Return the weights of rows in the robust loss."""
     return np.asarray((1.0 + (residuals / threshold.OUTLIER) ** 2) ** -0.25)
 
 
 def _median(values: FloatArray, weight: FloatArray) -> float:
-    """Median over the lines that take part; infinite where these are few."""
+    """Median over the lines with a weight; infinite where these are few."""
     use = weight > 0
     return float(np.median(values[use])) if np.count_nonzero(use) > 0.3 * use.size else np.inf
 
@@ -252,14 +254,14 @@ def _median(values: FloatArray, weight: FloatArray) -> float:
 
 
 def _rigid_bounds(gain: float, f: FloatArray) -> tuple[list[float], list[float]]:
-    """Gain, pole and delays (these are set by the problem)."""
+    """Bounds of gain and pole; those of the delays are set by the problem."""
     highest = float(np.log(0.5 * TURN * np.sqrt(f[0] * f[-1])))
     lowest = float(np.log(1e-3 * TURN * f[0]))
     return [gain - 2.5, lowest, 0.0, 0.0, 0.0], [gain + 2.5, highest, 0.0, 0.0, 0.0]
 
 
 def _modal_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Around a start, as far as modes are physical."""
+    """Bounds around a start, limited to physical modes."""
     low, high = _rigid_bounds(float(x[0]), f)
     for q in x[RIGID_PARAMETERS:].reshape(-1, MODE_PARAMETERS):
         low += [q[0] - 0.3, np.log(5e-4), q[2] - 4.0, -0.5]
@@ -268,7 +270,7 @@ def _modal_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _modal_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Modes that are damped alike at both ends."""
+    """Prior: the zero of a mode is near zero."""
     places = np.arange(RIGID_PARAMETERS + 3, x.size, MODE_PARAMETERS)
     slopes = np.zeros((places.size, x.size))
     slopes[np.arange(places.size), places] = 1.0 / threshold.USUAL_ZERO
@@ -276,7 +278,7 @@ def _modal_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Within factors of what the growth starts with."""
+    """Bounds as factors of the start."""
     whole = float(np.log(np.exp(x[0]) + np.sum(loads_of(x)[:, 0])))
     slow = np.log(1e-3 * TURN * f[0])
     fast = np.log(0.5 * TURN * np.sqrt(f[0] * f[-1]))
@@ -291,19 +293,19 @@ def _chain_bounds(x: FloatArray, f: FloatArray) -> tuple[FloatArray, FloatArray]
 
 
 def _chain_prior(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Couplings with an ordinary damping ratio d / 2√(kJ)."""
+    """Prior: an ordinary damping ratio d / 2√(kJ) of the couplings."""
     logs = x[RIGID_PARAMETERS:].reshape(-1, LOAD_PARAMETERS)
     ratio = logs @ _RATIO - np.log(2 * USUAL_DAMPING)
     return ratio / threshold.DAMPING_SPREAD, _chain_prior_slopes(x.size)
 
 
-#: Logarithm of a coupling's damping ratio by those of its J, k and d.
+#: Coefficients of a coupling's log damping ratio for its log J, log k and log d.
 _RATIO = np.array([-0.5, -0.5, 1.0])
 
 
 @lru_cache(maxsize=32)
 def _chain_prior_slopes(size: int) -> FloatArray:
-    """They depend on nothing but how many parameters there are; not to be written."""
+    """Slopes of the prior, which depend only on the number of parameters; cached, do not modify."""
     loads = (size - RIGID_PARAMETERS) // LOAD_PARAMETERS
     slopes = np.zeros((loads, size))
     slopes[:, RIGID_PARAMETERS:] = np.kron(np.eye(loads), _RATIO / threshold.DAMPING_SPREAD)
@@ -311,7 +313,7 @@ def _chain_prior_slopes(size: int) -> FloatArray:
 
 
 def _chain_inertia(x: FloatArray) -> tuple[float, FloatArray]:
-    """That of the motor and of all loads."""
+    """Inertia of the motor and of all loads."""
     parts = np.exp(np.concatenate([x[:1], x[RIGID_PARAMETERS::LOAD_PARAMETERS]]))
     whole = float(np.sum(parts))
     slopes = np.zeros(x.size)
@@ -321,7 +323,7 @@ def _chain_inertia(x: FloatArray) -> tuple[float, FloatArray]:
 
 
 def _modal_inertia(x: FloatArray) -> tuple[float, FloatArray]:
-    """That of the rigid part, whose gain is its inverse."""
+    """Inertia of the rigid part, whose gain is its inverse."""
     slopes = np.zeros(x.size)
     slopes[0] = -1.0
     return -float(x[0]), slopes
@@ -332,5 +334,5 @@ MODAL = Form(response_and_slopes, model_of, _modal_bounds, _modal_prior, _modal_
 
 
 def best_view(views: Sequence[View]) -> View:
-    """The one with the larger weights."""
+    """Return the view with the larger weights."""
     return max(views, key=lambda v: float(np.sum(np.minimum(v.weight, 100.0))))

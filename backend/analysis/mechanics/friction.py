@@ -1,4 +1,4 @@
-"""Coulomb friction, from how the realisations of a frequency response differ."""
+"""Coulomb friction, from the differences between realisations of a frequency response."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from backend.analysis.thresholds import friction as threshold
 
 
 def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> float:
-    """Coulomb friction that best explains the scatter between realisations.
+    """Return the Coulomb friction that best explains the scatter between realisations.
 
-    Friction is the one nonlinearity every axis has. Subtracting Tc·sign(v) from the torque
-    leaves the linear mechanics; Tc is where the error, as torque, summed over all lines is
-    smallest. Zero where realisations do not suffice or nothing is gained.
+    Coulomb friction is the nonlinearity that every axis has. Subtracting Tc·sign(v) from the torque
+    leaves the linear mechanics; Tc minimises the error, as torque, summed over all lines. Zero
+    where there are too few realisations or the scatter is not reduced.
     """
     if len(s.sent) < 2:
         return 0.0
@@ -36,8 +36,8 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
     )
     if limit <= 0.0:
         return 0.0
-    # By their noise first: behind a coarse encoder the upper lines drown friction, and elsewhere
-    # the lower ones show it best. What play does drowns it in all but the lowest.
+    # First with weights by noise: behind a coarse encoder noise at the upper lines hides friction,
+    # otherwise the lower lines show it best. Backlash hides it at all but the lowest lines.
     low = np.asarray(s.frequency_hz <= threshold.LOWEST * s.frequency_hz[0], dtype=np.float64)
     by_noise = _torque_weight(s, plain)
     found, share = _least(s, plain, turned, by_noise, limit)
@@ -52,9 +52,9 @@ def estimate_coulomb(s: LineSpectra, path: SignalPath, quantity: Quantity) -> fl
 
 
 def scatter_left(s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_nm: float) -> float:
-    """Share of the scatter between realisations that is left with this friction removed.
+    """Return the share of the scatter between realisations left after subtracting this friction.
 
-    It shows which of two ways to know the direction of motion is better; 1 without friction.
+    It shows which of two estimates of the direction of motion is better; 1 without friction.
     """
     if coulomb_nm <= 0.0 or len(s.sent) < 2:
         return 1.0
@@ -66,9 +66,10 @@ def scatter_left(s: LineSpectra, path: SignalPath, quantity: Quantity, coulomb_n
 
 
 def _beyond_chance(s: LineSpectra, share: float, left: float) -> bool:
-    """Whether friction is there that makes little of the scatter because noise makes the rest.
+    """Whether friction reduces the scatter by more than chance although noise is most of it.
 
-    It leaves this ``share`` of the scatter, which is ``left`` in units of one period's noise.
+    With friction this ``share`` of the scatter is left, which is ``left`` in units of one period's
+    noise.
     """
     periods = s.used / len(s.sent)
     if periods <= 1.0:
@@ -85,7 +86,7 @@ def _least(
     weight: FloatArray,
     limit: float,
 ) -> tuple[float, float]:
-    """Friction up to ``limit`` that leaves the least scatter, and the share that it leaves."""
+    """Friction up to ``limit`` with the least scatter, and the share of the scatter left."""
     found = scipy.optimize.minimize_scalar(
         _scatter, bounds=(0.0, limit), method="bounded", args=(s, plain, turned, weight)
     )
@@ -100,7 +101,7 @@ def _scatter(
     turned: list[ComplexArray],
     weight: FloatArray,
 ) -> float:
-    """What no linear mechanics explain with this friction removed, as torque."""
+    """Scatter, as torque, that linear mechanics do not explain with this friction removed."""
     inputs = [u - coulomb_nm * d for u, d in zip(plain, turned, strict=True)]
     g, _, _ = instrument_estimate(s, inputs)
     errors = np.array(
@@ -110,7 +111,7 @@ def _scatter(
 
 
 def _torque_weight(s: LineSpectra, inputs: list[ComplexArray]) -> FloatArray:
-    """One over the noise variance of each line as a torque; alike where one period shows none."""
+    """Inverse noise variance of each line as a torque; equal where a single period shows none."""
     g, _, _ = instrument_estimate(s, inputs)
     errors = [y / g - u for y, u in zip(s.response, inputs, strict=True)]
     freedom = s.used - len(errors)

@@ -1,4 +1,4 @@
-"""Bidirectional trapezoids from which inertia and friction can be reported, within an envelope."""
+"""Bidirectional trapezoids for the identification of inertia and friction, within an envelope."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Trajectory:
 def _there_and_back(
     travel: float, speed: float, acceleration: float, dwell_s: float, rate: float
 ) -> FloatArray:
-    """Velocity of one trapezoid forward, a dwell, and one back."""
+    """Velocity of one trapezoid forward, a dwell, one back, and a dwell."""
     peak = min(speed, float(np.sqrt(travel * acceleration)))
     ramp = max(2, int(np.ceil(peak / acceleration * rate)))
     cruise = max(0, round((travel / peak - peak / acceleration) * rate))
@@ -51,11 +51,11 @@ def design_moves(
     smoothing_s: float = 0.01,
     dwell_s: float = 0.05,
 ) -> Trajectory:
-    """Bidirectional trapezoids inside travel, speed and torque.
+    """Return bidirectional trapezoids inside travel, speed and torque.
 
     The acceleration uses 70 % of the torque left after friction; every second repetition runs at
-    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be reported
-    apart. ``smoothing_s`` bounds the jerk.
+    half speed and 60 % of the acceleration, so that viscous and Coulomb friction can be separated.
+    ``smoothing_s`` bounds the jerk.
 
     Raises:
         ValueError: the torque limit does not exceed the friction.
@@ -82,7 +82,7 @@ def design_moves(
     width = max(1, round(smoothing_s * sample_rate_hz))
     velocity = np.convolve(velocity, np.ones(width) / width)
     velocity = velocity - np.sum(velocity) / velocity.size * (velocity != 0)
-    # Ramps of whole samples make short moves longer than computed.
+    # Ramps of whole samples make short moves longer than calculated.
     reached = float(np.ptp(np.cumsum(velocity))) / sample_rate_hz
     velocity = velocity * min(1.0, 0.97 * limits.travel_rad / reached)
     position = np.cumsum(velocity) / sample_rate_hz

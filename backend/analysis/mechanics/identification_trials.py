@@ -1,4 +1,4 @@
-"""Trials of an identification: estimates and fits with one path, refined in turn. Pure."""
+"""Trials of an identification: estimates and fits with one path each, refined in turn."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ TRUSTED_ERROR = threshold.TRUSTED_ERROR
 
 @dataclass(frozen=True)
 class Views:
-    """The same mechanics by way of the reported velocity and of the reported position."""
+    """Estimates of the same mechanics from the reported velocity and from the reported position."""
 
     velocity: Frf
     position: Frf | None
@@ -45,7 +45,7 @@ class Views:
 
 @dataclass(frozen=True)
 class Trial:
-    """A fit, and the estimates and the path that it was made with."""
+    """A fit, with the estimates and the path that it was made with."""
 
     views: Views
     path: SignalPath
@@ -53,13 +53,13 @@ class Trial:
 
     @property
     def fit(self) -> SampledFit:
-        """What it says."""
+        """The fitted mechanics."""
         return self.solution.fit
 
 
 @dataclass(frozen=True)
 class Task:
-    """What stays the same from trial to trial."""
+    """Data and settings common to all trials."""
 
     records: tuple[Record, ...]
     quantity: Quantity
@@ -75,7 +75,7 @@ class Task:
         motion: SampledFit | None = None,
         start: Solution | None = None,
     ) -> Trial:
-        """Estimates and fit with one path; ``motion`` is a fit before, which shows the images."""
+        """Return estimates and fit with one path; ``motion``: an earlier fit, to correct images."""
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
         views = self.views(path, coulomb_nm)
@@ -91,9 +91,9 @@ class Task:
         return Trial(views, path, solution)
 
     def trials(self, paths: tuple[SignalPath, ...]) -> list[Trial]:
-        """All that are worth it, best first: fractions of a cycle where no whole ones do.
+        """Return all relevant trials, best first; fractions of a cycle only where whole ones fail.
 
-        Torque and motion are reported together, so a path that leaves much delay is a wrong one.
+        Torque and motion are reported together, so a path that leaves a large delay is wrong.
         """
         first = [p for p in paths if at_whole_cycles(p)] or list(paths)
         tried = sorted((self.trial(p) for p in first), key=rank)
@@ -102,9 +102,9 @@ class Task:
         return sorted(tried, key=rank)
 
     def at_cycles(self, path: SignalPath, hold: Hold) -> Trial:
-        """A fit with this hold and the whole cycles of delay that leave the least of one."""
+        """Return the fit with this hold and the whole cycles that leave the least delay."""
         rate = path.sample_rate_hz
-        # What is too early shows as a delay that is left, what is too late may not.
+        # A path that is too early shows as a remaining delay; one that is too late may not.
         cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
         late_s = command_delay_s(cycles, hold, rate)
         trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
@@ -116,7 +116,7 @@ class Task:
         return min(trial, other, key=rank)
 
     def by_motion(self, trial: Trial) -> Trial:
-        """The same with a path that only the motion moves, from where it is usual."""
+        """Return the trial refined with a path that only the motion adjusts, from the usual one."""
         for _ in range(threshold.MOTION_PASSES):
             uncertainty = self.uncertainty(trial, corner_known=False)
             finite = np.all(np.isfinite(uncertainty.path_step))
@@ -131,7 +131,7 @@ class Task:
         return trial
 
     def views(self, path: SignalPath, coulomb_nm: float | None) -> Views:
-        """Estimates from what was recorded."""
+        """Return the estimates from the recordings."""
         velocity = estimate_periodic(
             self.records, path, self.quantity, coulomb_nm=coulomb_nm, jitter_s=self.jitter_s
         )
@@ -148,7 +148,7 @@ class Task:
         return Views(velocity, position)
 
     def refined(self, first: Trial, path_of: Callable[[SampledFit], SignalPath]) -> Trial:
-        """Loop, path and mechanics in turn: each is needed to take the images out of the others."""
+        """Refine loop, path and mechanics alternately: each corrects the images in the others."""
         last = first
         for _ in range(threshold.PASSES if self.quantity == "torque_injection" else 0):
             path = path_of(last.fit)
@@ -159,10 +159,10 @@ class Task:
         return last
 
     def balanced(self, trial: Trial) -> tuple[Task, Trial]:
-        """The same refined with friction as the balance of torques shows it at reversals.
+        """Return the trial refined with friction at reversals taken from the balance of torques.
 
-        The round whose friction leaves the realisations most alike: a balance that is off bends
-        friction and damping against each other.
+        The round is kept whose friction makes the realisations most alike: an error of the balance
+        distorts friction and damping against each other.
         """
         task, last = self, trial
         best = task, last
@@ -186,9 +186,9 @@ class Task:
     def with_sure_modes(
         self, trial: Trial, uncertainty: Uncertainty, corner_known: bool
     ) -> tuple[Trial, Uncertainty]:
-        """The same with fewer modes as long as one of them may as well be none.
+        """Return the trial with fewer modes as long as one of them may not exist.
 
-        Two that share what one does are as little known, each by itself.
+        Two modes that share the response of one are individually uncertain as well.
         """
         motion = trial.fit if self.quantity == "torque_injection" else None
         while trial.fit.error <= TRUSTED_ERROR and _unsure(trial, uncertainty):
@@ -200,7 +200,7 @@ class Task:
         return trial, uncertainty
 
     def moved(self, trial: Trial, uncertainty: Uncertainty) -> Trial:
-        """The same mechanics refined on the path that torque and motion together would have."""
+        """Return the trial refined on the path that torque and motion together determine."""
         most = np.maximum(2.0 * uncertainty.path_std, threshold.LONGEST_STEP)
         step = np.clip(uncertainty.path_step, -most, most)
         path = moved_path(trial.path, float(step[0]), float(step[1]) if step.size > 1 else 0.0)
@@ -210,7 +210,7 @@ class Task:
     def uncertainty(
         self, trial: Trial, corner_known: bool, by_torque: SignalPath | None = None
     ) -> Uncertainty:
-        """How far path and mechanics may be off together.
+        """Return the joint uncertainty of path and mechanics.
 
         ``by_torque`` is the path that the torque alone shows, where the trial has another one.
         """
@@ -238,7 +238,7 @@ class Task:
         return joint_uncertainty(problem, trial.solution.x, shifted, covariance, moved)
 
     def _loop(self, path: SignalPath, motion: SampledFit | None) -> LoopModel:
-        """The controller that is closed meanwhile."""
+        """The controller that is active during the measurement."""
         if self.quantity == "torque_mode":
             return LoopModel()
         if self.loop is not None:
@@ -251,19 +251,19 @@ class Task:
 
 
 def _alike(one: SignalPath, other: SignalPath) -> bool:
-    """Whether another fit of the mechanics would give the same."""
+    """Whether a fit of the mechanics would be the same with both paths."""
     apart = abs(one.command_delay_s - other.command_delay_s) * one.sample_rate_hz
     corners = (one.current_bandwidth_hz or 1.0) / (other.current_bandwidth_hz or 1.0)
     return one.hold == other.hold and apart < 0.01 and abs(np.log(corners)) < 0.03
 
 
 def rank(trial: Trial) -> float:
-    """Less is better."""
+    """Return the rank of a trial; lower is better."""
     return trial.fit.score + _implausible(trial.fit)
 
 
 def _implausible(fit: SampledFit) -> float:
-    """A drive does not report what has not happened yet, and takes setpoints at whole cycles."""
+    """Penalty: a drive reports nothing before it happens, and takes setpoints at whole cycles."""
     path = fit.path
     first_s = min(fit.delay_s, fit.position_delay_s)
     early = max(-first_s * path.sample_rate_hz - 0.1, 0.0)
@@ -272,7 +272,7 @@ def _implausible(fit: SampledFit) -> float:
 
 
 def _hidden_by_friction(trial: Trial) -> bool:
-    """Whether lines were so uncertain by friction that other mechanics may have been there."""
+    """Whether friction made lines so uncertain that other mechanics may have been hidden."""
     uncertainty = trial.views.velocity.friction
     return (
         uncertainty is not None
@@ -281,14 +281,14 @@ def _hidden_by_friction(trial: Trial) -> bool:
 
 
 def _unsure(trial: Trial, uncertainty: Uncertainty) -> bool:
-    """Whether a mode within the band has a part in the response that may be nothing."""
+    """Whether a mode within the band has a residue that may be zero."""
     low, high = trial.views.velocity.frequency_hz[0], trial.fit.valid_band_hz[1]
     pairs = zip(trial.fit.model.modes, mode_uncertainties_of(trial, uncertainty), strict=True)
     return any(d.residue > threshold.UNSURE and low < m.frequency_hz < high for m, d in pairs)
 
 
 def mode_uncertainties_of(trial: Trial, uncertainty: Uncertainty) -> tuple[ModeUncertainty, ...]:
-    """With what friction may do to all lines together."""
+    """Return the uncertainties of the modes, with the common effect of friction on all lines."""
     given = [view for view in (trial.views.velocity, trial.views.position) if view is not None]
     together = [
         np.zeros(v.frequency_hz.size, np.complex128) if v.friction is None else v.friction

@@ -1,9 +1,9 @@
-"""From recordings to mechanics: direct estimate, delay, model, and estimate without images.
+"""Identification of mechanics: direct estimate, delay, model, and estimate without images.
 
 The steps of tuning.md section 2 in one call: a direct estimate; a continuous model fitted
 through hold and sampling that also finds the delay; the direct estimate again, with the delay
-and the folded images removed. The corrected lines stay measurements: the model only supplies
-the ratio between what sampling shows and what is there.
+and the folded images removed. The corrected lines remain measurements: the model only supplies
+the ratio between the sampled and the true response.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ _HOLDS: tuple[Hold, ...] = ("zero", "linear")
 
 @dataclass(frozen=True)
 class Identification:
-    """Everything about one measurement of the mechanics.
+    """The result of one measurement of the mechanics.
 
-    ``direct`` is the estimate with only hold, current loop and delay divided out and its
-    band (0.25 of the sample rate); ``corrected`` has the folded images removed as well and holds
-    to 0.4; ``fit`` is the model that did it. When no model fits (``trusted`` False), both are the
-    plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows play, the
+    ``direct`` is the estimate with only hold, current loop and delay divided out, and its band
+    (0.25 of the sample rate); ``corrected`` has the folded images removed as well and is valid up
+    to 0.4; ``fit`` is the model used for that. When no model fits (``trusted`` False), both are the
+    plain estimate with a band of 0.1 of the sample rate. Where ``distortion`` shows backlash, the
     model is not trusted either: both are the direct estimate, without the lines beyond its band.
     """
 
@@ -74,13 +74,13 @@ class Identification:
     trusted: bool = True
     distortion: Distortion | None = None
     modes: tuple[ModeUncertainty, ...] = ()
-    """How exactly each mode of the model is known; empty where no model is trusted."""
+    """Uncertainty of each mode of the model; empty where no model is trusted."""
     torque_dropped: bool = False
     """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
     torque_unexplained: bool = False
     """Whether hold, delay and one lag do not explain the reported torque."""
     by_place: InertiaByPlace | None = None
-    """The inertia's part that goes with the place; the band holds the response of all places."""
+    """The position-dependent part of the inertia; the band covers all positions."""
 
 
 def identify_mechanics(
@@ -92,10 +92,10 @@ def identify_mechanics(
     max_modes: int = 4,
     jitter_s: float = 0.0,
 ) -> Identification:
-    """Mechanics from torque to velocity out of periodic recordings.
+    """Identify the mechanics from torque to velocity from periodic recordings.
 
-    ``quantity`` is *torque_mode* or *torque_injection*; ``path`` holds the known delays, what is
-    left is found by the fit. ``coulomb_nm`` as in :func:`estimate_periodic`, None estimates it.
+    ``quantity`` is *torque_mode* or *torque_injection*; ``path`` contains the known delays, the
+    remaining delay is fitted. ``coulomb_nm`` as in :func:`estimate_periodic`, None estimates it.
     """
     task = Task(settled(records), quantity, max_modes, jitter_s)
     found = task.refined(task.trial(path, coulomb_nm), lambda _: path)
@@ -116,13 +116,13 @@ def identify_with_path(
     inertia: KnownInertia | None = None,
     loop: ReferenceLoop | None = None,
 ) -> Identification:
-    """As `identify_mechanics`, with what ``path`` does not give found from the recording.
+    """Identify as `identify_mechanics`, and take from the recording what ``path`` does not state.
 
-    The torque alone cannot always show whether setpoints are interpolated; the motion can: a
-    wrong answer leaves a delay that is negative, or a roll-off that no mechanics have. Next to a
-    closed loop, path and mechanics need each other, and are refined in turn. ``inertia`` is the
-    whole axis', where moves have shown it. ``loop`` is the closed loop, where its
-    reference has shown it: the path, too, is known then.
+    The torque alone cannot always show whether setpoints are interpolated; the motion can: a wrong
+    answer leaves a negative delay, or a roll-off that no mechanics have. With a closed loop, path
+    and mechanics depend on each other and are refined in turn. ``inertia`` is that of the whole
+    axis, where moves have shown it. ``loop`` is the closed loop, where it was identified from its
+    reference; the path is then known as well.
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
@@ -167,16 +167,16 @@ def identify_with_path(
 def _by_motion(
     task: Task, paths: tuple[SignalPath, ...], corner_known: bool
 ) -> tuple[Task, list[Trial], bool]:
-    """Trials without the reported torque, where that cannot be the mechanics' input; else with it.
+    """Trials without the reported torque where it cannot be the mechanics' input; else with it.
 
     A torque that is reported late, or a copy of the demand, shows another path than the one to the
-    mechanics. Collocated mechanics are passive, which the model's are by construction: a lag that
-    is not there leaves them unexplained. So both holds are tried with ordinary paths that the
-    motion alone moves, and used where that explains the motion clearly better. The last value
-    shows whether they were.
+    mechanics. Collocated mechanics are passive, and so is the model by construction: a lag that
+    does not exist leaves them unexplained. So both holds are tried with ordinary paths that only
+    the motion adjusts, and used where they explain the motion clearly better. The last value
+    states whether they were.
 
-    A path that is odd by itself is tried from the motion's mechanics first: a search from nothing
-    with a wrong path finds no end for long.
+    A path that is implausible by itself is first tried with the mechanics found from the motion as
+    a start: a search without a start converges slowly on a wrong path.
     """
     odd = _odd(task, paths[0], corner_known)
     trials = [] if odd else task.trials(paths)
@@ -206,24 +206,24 @@ def _by_motion(
 
 
 def _explains(one: SampledFit, other: SampledFit, by: float, share: float) -> bool:
-    """Whether a fit is better than another by this much, and its misfit this share of it."""
+    """Whether a fit's score is better by ``by``, and its misfit below this share of the other's."""
     return one.score < other.score - by and one.error < share * other.error
 
 
 def _odd(task: Task, path: SignalPath, corner_known: bool) -> bool:
-    """Whether the path that the reported torque shows is none of a torque that acts."""
+    """Whether the path from the reported torque is implausible for a torque that acts."""
     if any(record.torque is None for record in task.records):
         return False
     corner = path.current_bandwidth_hz or USUAL_CURRENT_HZ
     odd = not corner_known and not threshold.ORDINARY_HZ[0] < corner < threshold.ORDINARY_HZ[1]
     left = torque_left(task.records, path)
-    # Parts of a cycle are no reason where they explain the torque to its rounding.
+    # A fraction of a cycle is plausible where it explains the torque to its rounding.
     parts = not at_whole_cycles(path) and left > threshold.ROUNDED
     return odd or parts or left > threshold.TORQUE_LEFT
 
 
 def _suspect(task: Task, trial: Trial, corner_known: bool) -> bool:
-    """Whether the motion shows that the reported torque may be another than what drives it."""
+    """Whether the motion indicates that the reported torque is not the one that drives it."""
     if any(record.torque is None for record in task.records):
         return False
     late = abs(trial.fit.delay_s) > threshold.LEFT_BY_TORQUE_S
@@ -231,9 +231,9 @@ def _suspect(task: Task, trial: Trial, corner_known: bool) -> bool:
 
 
 def _beyond_passive(trial: Trial) -> bool:
-    """Whether lines show a phase that no passive mechanics have between torque and speed.
+    """Whether the phase between torque and speed exceeds that of passive mechanics.
 
-    Sampling folds a few degrees into the lines below a quarter of its rate.
+    Aliasing shifts the phase of lines below a quarter of the sample rate by a few degrees.
     """
     frf = trial.views.position or trial.views.velocity
     late = trial.fit.position_delay_s if trial.views.position else trial.fit.delay_s
@@ -250,7 +250,7 @@ def _beyond_passive(trial: Trial) -> bool:
 
 
 def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Identification:
-    """The estimates with what the fit found removed."""
+    """The estimates, corrected by the result of the fit."""
     views, path, fit = trial.views, trial.path, trial.fit
     spoilt = distortion(task.records, path, task.quantity, views.velocity)
     by_place = inertia_by_place(task.records, fit.path, task.quantity, views.velocity.coulomb_nm)
@@ -259,7 +259,7 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
         return frf if by_place is None else by_place.charged(frf)
 
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
-        # A filter of the speed that nothing states would stay in the lines; the position has none.
+        # An unknown speed filter would remain in the lines; the position passes none.
         if views.position is not None and path.response_bandwidth_hz is None:
             plain = unexplained(views.position, trial.solution, 1)
         else:
@@ -270,7 +270,7 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
     # Images stay in the direct estimate: its band must contain them.
     direct = [widened(p.lines, p.factor, 1.0, p.direct) for p in parts]
     corrected = [without_images(p.lines, p.factor, task.jitter_s, p.corrected) for p in parts]
-    # Play changes stiffness, and so everything above the frequency where it shows most.
+    # Backlash changes the stiffness, and so all lines above the one where it shows most.
     share = (
         np.maximum.accumulate(spoilt.share) if spoilt.play else threshold.AVERAGED * spoilt.share
     )
@@ -299,7 +299,7 @@ def _without_path(trial: Trial) -> ComplexArray:
 
 
 def _undecided(found: Identification, best: Trial, others: list[Trial]) -> Identification:
-    """Charge to the band how far another path that explains as much would move the lines."""
+    """Add to the band the change of the lines for another path that explains as much."""
     if not found.trusted or not others:
         return found
     apart = np.log(np.array([_without_path(t) for t in others]) / _without_path(best))

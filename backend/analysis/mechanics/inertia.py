@@ -1,10 +1,10 @@
 """Inertia and friction from bidirectional moves.
 
-torque = J·a + b·ω + Tc·sign(ω) + Tg, every signal through the *same* zero-phase filter (so that
-the filter drops out of the equation), samples near standstill left out, outliers weighted down
-(Huber 1964), loads that swing kept apart (`load_swing`), torques that depend on the place
-or grow with the square of the speed where they show (`load_terms`), and intervals that know how
-few independent samples a filtered signal holds, and how long what is left swings.
+torque = J·a + b·ω + Tc·sign(ω) + Tg, with every signal passed through the *same* zero-phase filter
+(so that the filter cancels), samples near standstill left out, outliers weighted down (Huber 1964),
+oscillating loads modelled separately (`load_swing`), torques that depend on the position or grow
+with the square of the speed where they are detected (`load_terms`), and intervals that account for
+the few independent samples of a filtered signal and for residuals that oscillate.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from backend.analysis.thresholds import inertia as threshold
 
 SYSTEMATIC_SHARE = np.array(threshold.SYSTEMATIC_SHARE)
 
-#: Columns of a rigid axis with friction, as `_columns` makes them.
+#: Number of columns of a rigid axis with friction, as `_columns` makes them.
 _RIGID = 6
 
-#: Why data do not support an answer, in the order in which they are stated.
+#: Reasons why data do not support a result, in the order in which they are stated.
 Reason = Literal[
     "at-limit", "one-direction", "too-little-acceleration", "torque-opposes-acceleration",
     "negative-friction", "does-not-follow", "backlash", "below-motor-inertia", "too-few-samples",
@@ -51,10 +51,11 @@ class Interval:
 
 @dataclass(frozen=True)
 class InertiaResult:
-    """SI units at the motor shaft. ``reasons`` say why it is not identifiable.
+    """Results in SI units at the motor shaft.
 
-    ``identifiable`` is False when the data do not support an answer; the numbers are then what
-    the regression said and must not be used.
+    ``identifiable`` is False when the data do not support a result, for the stated ``reasons``; the
+    values are then those of the regression and must not be used. ``load_ratio`` is the inertia
+    ratio, load to motor.
     """
 
     inertia_kgm2: Interval
@@ -66,7 +67,7 @@ class InertiaResult:
     identifiable: bool
     reasons: tuple[Reason, ...]
     load_terms: FoundTerms = NO_LOAD_TERMS
-    """What the torque depends on in addition to inertia and friction."""
+    """Torques in addition to inertia and friction."""
 
 
 def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
@@ -79,7 +80,7 @@ def _smoothing_kernel(sample_rate_hz: float, cutoff_hz: float) -> FloatArray:
 
 
 def _slope_kernel(kernel: FloatArray) -> FloatArray:
-    """Kernel that smooths as ``kernel`` does and differentiates (per sample): t·k(t), so scaled
+    """Kernel that smooths as ``kernel`` does and differentiates (per sample): t·k(t), scaled so
     that a ramp of slope 1 gives exactly 1.
     """
     n = np.arange(kernel.size) - kernel.size // 2
@@ -105,9 +106,9 @@ def _huber(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _swinging_variance(
     a: FloatArray, residual: FloatArray, weight: FloatArray, keep: BoolArray, block: int
 ) -> FloatArray:
-    """Variances of the solution of a·x = b whose residual swings (Newey & West 1987).
+    """Variances of the solution of a·x = b with an oscillating residual (Newey & West 1987).
 
-    What a model leaves of a swing is alike for many samples, and grows and falls with the columns.
+    The unmodelled part of an oscillation is correlated over many samples and with the columns.
     Bartlett's weights of the lags up to ``block`` are those of overlapping sums of that length.
     """
     scores = np.zeros((keep.size + 2 * block, a.shape[1]))
@@ -130,14 +131,14 @@ def estimate_inertia(
     valid: BoolArray | None = None,
     position_rad: FloatArray | None = None,
 ) -> InertiaResult:
-    """Regression over whole recordings of moves in both directions.
+    """Regress over whole recordings of moves in both directions.
 
-    ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak
-    speed. The motion must be smooth between bus cycles (interpolated, or made by the drive's own
-    profile): with a reference that steps every cycle T, the torque sampled next to each step is
-    off by half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the
-    motor's; without it the speed is summed up. Samples at the torque limit,
-    in gaps (``valid`` False) and within the filter's reach of either are left out.
+    ``torque_nm`` is the motor's torque. ``minimum_speed_rad_s`` defaults to 5 % of the peak speed.
+    The motion must be smooth between bus cycles (interpolated, or made by the drive's own profile):
+    with a reference that steps every cycle T, the torque sampled next to each step has an error of
+    half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the motor's;
+    without it the speed is integrated. Samples at the torque limit, in gaps (``valid`` False) and
+    within the filter's reach of either are left out.
 
     Raises:
         ValueError: the arrays differ in length, or are shorter than the filter.
@@ -155,7 +156,7 @@ def estimate_inertia(
     angle = angle_of(velocity_rad_s, sample_rate_hz) if position_rad is None else position_rad
     if valid is not None and np.any(valid):
         spoilt = saturated | ~valid
-        # A load that swings remembers what a gap seems to do.
+        # Interpolated, since a step at a gap would excite the model of an oscillating load.
         count = np.arange(n)
         velocity_rad_s = np.interp(count, count[valid], velocity_rad_s[valid])
         angle = np.interp(count, count[valid], angle[valid])
@@ -193,10 +194,10 @@ def _machine(
     rate: float,
     highest_hz: float,
 ) -> tuple[Terms, FloatArray, FloatArray]:
-    """What of the machine shows in the torque in addition to a rigid inertia and friction.
+    """Components of the torque in addition to a rigid inertia and friction.
 
-    Returns the terms, all columns (the rigid ones, those of the terms, those of loads that
-    swing) and how what was searched bends them [n, columns].
+    Returns the terms, all columns (the rigid ones, those of the terms, those of oscillating loads)
+    and their slopes [n, columns] by the parameters that were searched.
     """
     acceleration = rigid[:, 0]
 
@@ -211,7 +212,7 @@ def _machine(
     terms = find_terms(np.column_stack([rigid, *swinging]), torque, motion, keep)
     known = np.column_stack([rigid, terms.columns(motion)])
     if terms != Terms():
-        # Without them they may have been mistaken for a load that swings.
+        # Without the terms they may have been taken for an oscillating load.
         swinging, slopes = lags(known)
     bends = np.column_stack([np.empty((torque.size, 0)), *slopes, *terms.slopes(motion)])
     return terms, np.column_stack([known, *swinging]), bends
@@ -226,18 +227,18 @@ def _smooth(x: FloatArray, kernel: FloatArray) -> FloatArray:
 def _columns(
     velocity_rad_s: FloatArray, kernel: FloatArray, slowest: float, rate: float
 ) -> FloatArray:
-    """What torque is regressed upon [n, 6]: acceleration, velocity, direction, one, and how
-    acceleration changes, to the first and second order.
+    """Columns of the regression [n, 6]: acceleration, velocity, direction, one, and the first and
+    second derivative of the acceleration.
     """
-    # The derivative of the smoothing kernel itself: a difference of samples would smooth more
-    # than the other signals are smoothed, and J would come out small.
+    # The derivative of the smoothing kernel itself: a difference of samples would smooth more than
+    # the other signals are smoothed, which would bias J low.
     acceleration = _smooth(velocity_rad_s, _slope_kernel(kernel)) * rate
     direction = _smooth(np.clip(velocity_rad_s / max(0.2 * slowest, 1e-12), -1.0, 1.0), kernel)
-    # A speed reported later than the torque (by the drive's filter, 0.2 ms are enough) bends
-    # the two frictions against each other: to first order that is the first derivative.
+    # A speed reported later than the torque (by the drive's filter, 0.2 ms are enough) biases the
+    # two frictions against each other: to first order that is the first derivative.
     late = np.gradient(acceleration) * rate
-    # A load behind a spring of antiresonance ω_a seems heavier by (ω/ω_a)²: to first order that is
-    # the second derivative, which would else count as inertia.
+    # A load behind a spring of antiresonance ω_a appears heavier by (ω/ω_a)²: to first order that
+    # is the second derivative, which would otherwise count as inertia.
     springy = np.gradient(late) * rate
     return np.column_stack(
         [acceleration, _smooth(velocity_rad_s, kernel), direction, np.ones(direction.size), late,
@@ -246,7 +247,7 @@ def _columns(
 
 
 def _nothing(saturated_share: float) -> InertiaResult:
-    """The answer where there is next to nothing to regress over."""
+    """The result where there are too few samples for a regression."""
     nothing = Interval(float("nan"), float("nan"), float("nan"))
     reasons: tuple[Reason, ...] = ("too-few-samples",)
     if saturated_share > 0.05:
@@ -265,7 +266,7 @@ def _intervals(
 ) -> list[Interval]:
     """J, viscous, Coulomb and gravity torque with their 95 % intervals.
 
-    ``bends`` are what frequencies and dampings of swings, which were searched, do to the torque.
+    ``bends`` are the slopes of the torque by the searched frequencies and dampings of oscillations.
     """
     whole = np.column_stack([a, bends])
     scale = np.maximum(np.max(np.abs(whole), axis=0), 1e-12)
@@ -282,7 +283,7 @@ def _intervals(
     swinging = swinging * float(scipy.special.stdtrit(blocks, 0.975)) ** 2
     uncertainty = np.sqrt(np.maximum(np.maximum(plain, swinging), 0.0)) / scale
     half = np.hypot(uncertainty[:4], SYSTEMATIC_SHARE * np.abs(x[:4]))
-    # What reversals bend of Coulomb friction, viscous friction makes up for at the speeds moved at.
+    # Errors of Coulomb friction at reversals are compensated by viscous friction at these speeds.
     speed = float(np.sqrt(np.mean(a[:, 1] ** 2)))
     half[1] = np.hypot(half[1], threshold.DISTINGUISHED * abs(x[2]) / speed)
     return [
@@ -299,16 +300,16 @@ def _regress(
     saturated_share: float,
     motor_inertia_kgm2: float | None,
 ) -> tuple[InertiaResult, FloatArray]:
-    """Solve, judge and report; the result, and the size of every column."""
+    """Solve, judge and report; returns the result, and the coefficient of every column."""
     scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
     x, weight = _huber(a / scale, b)
     driving = min(float(x[1] / scale[1]), 0.0)
     if driving < 0:
-        # Friction does not drive: where noise says so, there is too little viscous friction to see.
+        # Negative viscous friction is caused by noise: there is too little of it to be detected.
         x, weight = _huber(a / scale * (np.arange(a.shape[1]) != 1), b)
     residual = b - (a / scale) @ x
     parts = _intervals(a, bends, x / scale, residual, weight, keep, block)
-    # It may be as far above zero as the data put it below.
+    # The upper end is as far above zero as the estimate was below it.
     parts[1] = Interval(parts[1].value, parts[1].low + driving, parts[1].high - driving)
     total = float(np.sum(weight * (b - np.average(b, weights=weight)) ** 2))
     r2 = 1.0 - float(np.sum(weight * residual**2)) / total if total > 0 else 0.0
@@ -334,7 +335,7 @@ def _reasons(
     r2: float,
     saturated_share: float,
 ) -> list[Reason]:
-    """Why the data do not support an answer."""
+    """Reasons why the data do not support a result."""
     reasons: list[Reason] = []
     inertia = parts[0]
     if saturated_share > 0.05:
@@ -357,7 +358,7 @@ def _reasons(
 
 
 def _looks_like_backlash(a: FloatArray, b: FloatArray, residual: FloatArray) -> bool:
-    """Few samples with residuals far above all others, as knocks make (excess of the tails)."""
+    """Whether few residuals are far above all others, as impacts cause them."""
     scale = 1.4826 * float(np.median(np.abs(residual)))
     span = float(np.std(b))
     if scale <= 0 or span <= 0 or float(np.std(a[:, 0])) <= 0:

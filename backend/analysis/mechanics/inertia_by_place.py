@@ -1,7 +1,7 @@
-"""Whether the inertia depends on the place, from realisations that moved about different places.
+"""Detects an inertia that depends on the position, from realisations at different positions.
 
-With J(θ) the torque is J·α + J'·ω²/2 (Lagrange). A crank, a cam or a load off its axis gives J
-once per revolution: its part that no single response explains is what realisations differ by.
+With J(θ) the torque is J·α + J'·ω²/2 (Lagrange). A crank, a cam or an eccentric load varies J once
+per revolution: the part that no single response explains makes the realisations differ.
 """
 
 from __future__ import annotations
@@ -28,18 +28,20 @@ from backend.analysis.thresholds import inertia_by_place as threshold
 
 @dataclass(frozen=True)
 class InertiaByPlace:
-    """Once per revolution of the motor: kg·m² (units of the torque and rad), and one deviation."""
+    """Variation of the inertia once per motor revolution, kg·m² (in units of the torque and rad):
+    amplitude and standard deviation.
+    """
 
     amplitude_kgm2: float
     std_kgm2: float
 
     def share(self, frf: Frf) -> FloatArray:
-        """By how much it moves the logarithm of each line of torque to speed, to one side."""
+        """Return the relative change of each line of torque to speed, to one side."""
         turn = 2 * np.pi * frf.frequency_hz * np.abs(frf.response)
         return np.asarray(self.amplitude_kgm2 * turn)
 
     def charged(self, frf: Frf) -> Frf:
-        """The band with what another place may do: two places differ by twice the amplitude."""
+        """Return the band widened for other positions: two differ by up to twice the amplitude."""
         share = self.share(frf)
         return replace(
             frf,
@@ -51,7 +53,7 @@ class InertiaByPlace:
 def inertia_by_place(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, coulomb_nm: float
 ) -> InertiaByPlace | None:
-    """The inertia's part that goes with the place; None where nothing shows one.
+    """Return the position-dependent part of the inertia; None where none is detected.
 
     ``coulomb_nm`` is the friction that is removed from the torque.
     """
@@ -73,7 +75,7 @@ def inertia_by_place(
     ]
 
     def apart(rows: Sequence[ComplexArray]) -> list[ComplexArray]:
-        """What one response of all realisations does not explain."""
+        """Return the part that one common response of all realisations does not explain."""
         own = sum(n * r.conj() for n, r in zip(rows, sent, strict=True)) / s_ur
         return [n - own * u for n, u in zip(rows, means, strict=True)]
 
@@ -85,7 +87,7 @@ def inertia_by_place(
         rows = [_torque(r, phase) / late for r in reported]
         columns.append(np.concatenate([c[use] for c in apart(rows)]))
     target = -np.concatenate([r[use] for r in left])
-    # Lines weigh by the torque that is left around them: noise and friction rule low lines.
+    # Weights by the residual torque of neighbouring lines: noise and friction dominate low lines.
     size = np.sqrt(np.mean([np.abs(r[use]) ** 2 for r in left], axis=0))
     weight = np.tile(1.0 / np.maximum(_around(size), 1e-12), len(reported))
     a = np.column_stack(columns) * weight[:, None]
@@ -93,7 +95,7 @@ def inertia_by_place(
     matrix, rhs = np.concatenate([a.real, a.imag]), np.concatenate([b.real, b.imag])
     x = np.linalg.lstsq(matrix, rhs, rcond=None)[0]
     rest = rhs - matrix @ x
-    # Realisations share one response, so that one of them shows nothing.
+    # Realisations share one response, so that a single one shows nothing.
     freedom = max(rest.size * (len(reported) - 1) / len(reported) - 2.0, 1.0)
     covariance = np.linalg.pinv(matrix.T @ matrix) * float(rest @ rest) / freedom
     amplitude = float(np.hypot(*x))
@@ -108,7 +110,7 @@ def inertia_by_place(
 
 
 def _torque(record: Record, phase: float) -> ComplexArray:
-    """Torque [lines] of an inertia sin(θ + phase) of one: its α and what its slope does."""
+    """Torque [lines] of an inertia sin(θ + phase) of amplitude 1: by α, and by its slope."""
     assert record.position is not None
     e = record.excitation
     speed = record.response
@@ -120,6 +122,6 @@ def _torque(record: Record, phase: float) -> ComplexArray:
 
 
 def _around(size: FloatArray) -> FloatArray:
-    """Smoothed over the lines around."""
+    """RMS over the neighbouring lines."""
     padded = np.pad(size, 4, mode="edge")
     return np.asarray(np.sqrt(np.convolve(padded**2, np.full(9, 1 / 9), "valid")))

@@ -1,6 +1,6 @@
-"""Where a chain may have one more load: many ways are tried, images included, and ranked.
+"""Search for one more load in a chain: many ways are tried, images included, and ranked.
 
-Each way is a load at a place of the chain; what only gain and delay distinguish is one way.
+Each way is a load at a place of the chain; ways that differ only in gain and delay count as one.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ from backend.analysis.thresholds import load_search as threshold
 
 
 def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
-    """The best starts with one more load, by trying very many on some lines."""
+    """Return the best starts with one more load, from many candidates evaluated on some lines."""
     view = best_view(problem.views)
     lines = informative_lines(view, found)
     f = view.f[lines]
     weight = np.minimum(view.weight[lines], 100.0).astype(np.float32)
     cycles_per_sample = (f * problem.period_s).astype(np.float32)
-    # What is folded back from beyond a few kHz is weak.
+    # Images from beyond a few kHz are weak.
     images = max(1, round(threshold.SEARCHED_HZ * problem.period_s))
     sampler = view.sampler.thinned(lines).nearest(images).single()
     every = sampler.frequency_hz
@@ -89,7 +89,7 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
 def _without_gain_and_delay(
     logs: ComplexArray, cycles: FloatArray, weight: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """What is left of logarithms [n, lines] without a common gain and delay, and these two [n].
+    """Logarithms [n, lines] without a common gain and delay, and these two [n].
 
     ``cycles`` are the lines' frequencies times the sampling period, in which the delay is counted.
     """
@@ -102,7 +102,7 @@ def _without_gain_and_delay(
 
 
 def _adjusted(x: FloatArray, gain: float, cycles: float) -> FloatArray:
-    """A chain whose response is smaller by the logarithm ``gain`` and comes earlier by cycles."""
+    """A chain whose response is smaller by the logarithm ``gain`` and earlier by ``cycles``."""
     out = x.copy()
     out[[0, 1, *range(RIGID_PARAMETERS, x.size)]] += gain
     out[2:4] -= cycles
@@ -110,9 +110,9 @@ def _adjusted(x: FloatArray, gain: float, cycles: float) -> FloatArray:
 
 
 def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
-    """The chain whose modes are those found and the one that explains most of what is left.
+    """Return the chain with the modes found and the one that explains most of the residual.
 
-    Splitting an inertia moves all modes; this start leaves the known ones where they are.
+    Splitting an inertia shifts all modes; this start keeps the known ones in place.
     """
     view, model = best_view(problem.views), found.model
     f = view.f
@@ -159,10 +159,10 @@ def with_one_more_mode(problem: Problem, found: Found) -> list[FloatArray]:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A way to add a load: where, logarithms of its antiresonance and of its share, and how.
+    """A way to add a load: place, logarithms of its antiresonance and of its inertia ratio.
 
-    ``new`` [4] as in `responses_with_load`; the common gain (logarithm) and delay (cycles) that
-    it would fit better with.
+    ``new`` [4] as in `responses_with_load`; ``gain`` (logarithm) and ``cycles`` (delay) are the
+    common corrections with which it fits best.
     """
 
     cost: float
@@ -174,13 +174,13 @@ class _Trial:
     cycles: float
 
     def start(self, x: FloatArray) -> FloatArray:
-        """Parameters to begin with, from those of the chain that it is added to."""
+        """Return the start parameters, from those of the chain that it is added to."""
         kept, inertia, stiffness, damping = (float(v) for v in self.new)
         more = with_load(x, self.place, (kept, inertia, stiffness, damping))
         return _adjusted(more, self.gain, self.cycles)
 
     def like(self, other: _Trial, apart: float) -> bool:
-        """Whether both lead to the same place: frequencies less ``apart`` (logarithm)."""
+        """Return whether both lead to the same solution: log frequencies closer than ``apart``."""
         return (
             self.place == other.place
             and abs(self.frequency - other.frequency) < apart
@@ -189,7 +189,7 @@ class _Trial:
 
 
 def informative_lines(view: View, found: Found, count: int = 35) -> npt.NDArray[np.int64]:
-    """Some lines evenly, and those that are explained worst so far."""
+    """Return some lines evenly spaced, and those that are explained worst so far."""
     rest = np.hypot(*np.split(_residuals_of(view, found), 2))
     even = np.linspace(0, view.f.size - 1, min(count, view.f.size)).astype(np.int64)
     return np.unique(np.concatenate([even, np.argsort(-rest)[:count]]))
@@ -202,9 +202,9 @@ def _residuals_of(view: View, found: Found) -> FloatArray:
 
 
 def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatArray) -> FloatArray:
-    """All loads [n, 4] that are tried at one place: added to what is there, or removed from it.
+    """All loads [n, 4] to be tried at one place: added to the inertia there, or split from it.
 
-    Where the explanation fails most, there is an antiresonance or a resonance.
+    The worst explained lines are tried both as antiresonance and as resonance.
     """
     whole = float(np.exp(x[0]) if place == 0 else loads_of(x)[place - 1, 0])
     rows = []
@@ -222,7 +222,7 @@ def _new_loads(x: FloatArray, place: int, grid_hz: FloatArray, worst_hz: FloatAr
 def _different(
     trials: list[_Trial], known: list[_Trial], count: int, apart: float = threshold.APART
 ) -> list[_Trial]:
-    """The best few that are neighbours neither of the known ones nor of each other."""
+    """The best few that are similar neither to the known ones nor to each other."""
     kept: list[_Trial] = []
     for trial in trials:
         if not any(trial.like(k, apart) for k in [*known, *kept]):
@@ -233,7 +233,7 @@ def _different(
 
 
 def _worst_hz(view: View, found: Found, count: int = 4) -> FloatArray:
-    """Where the explanation fails most, at places that are not neighbours."""
+    """The worst explained frequencies that are not neighbours."""
     rest = np.hypot(*np.split(_residuals_of(view, found), 2))
     chosen: list[float] = []
     for i in np.argsort(-rest):

@@ -1,14 +1,14 @@
 """Backlash, stiffness and transmission error between two encoders, one at each end of a coupling.
 
 While a flank is in contact the twist is δ = ±b/2 + (J·α + F·sign ω)/k, with the acceleration α of
-the load, its inertia J and its dry friction F: its equation of motion, whatever the motor does.
-Slow passes show the transmission error over the angle, reciprocating moves of some accelerations
-show b and J/k. On which flank the load lies follows from the sign of α + F/J·sign ω + pull/J: both
-quotients are searched for, and an answer counts only where the friction that it finds puts the load
-on the flanks that were assumed. Angles are those of the motor shaft.
+the load, its inertia J and its dry friction F: the load's equation of motion, which holds for any
+motion of the motor. Slow passes show the transmission error over the angle; reciprocating moves at
+several accelerations show b and J/k. The flank in contact follows from the sign of
+α + F/J·sign ω + pull/J: both quotients are searched for, and a result is accepted only where the
+friction found puts the load on the assumed flanks. Angles are those of the motor shaft.
 
 Every column of the regression passes the same low-pass filter as the measured angle, so that
-quantisation is averaged and no signal is late against another.
+quantisation is averaged and no signal lags another.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Value:
-    """A figure and half the width of its 95 % interval."""
+    """A value and half the width of its 95 % interval."""
 
     value: float
     half: float
@@ -45,14 +45,14 @@ class Value:
 
 @dataclass(frozen=True)
 class LoadSide:
-    """What both encoders show, in rad of the motor shaft.
+    """Results from both encoders, in rad of the motor shaft.
 
     ``backlash_rad`` is None where no assignment of the samples to two flanks agrees with the data,
-    as where friction or a pull keeps the load on its flank in every move; the lost motion bounds it
-    then. ``twist_s2`` is J/k, None where it is no larger than its uncertainty; ``most_twist_s2`` is
-    what it does not exceed. Both are None where ``backlash_rad`` is, as they rest on the same
-    flanks, and where the load is ``pulled`` too much. ``load_inertia_kgm2`` needs the motor's own
-    inertia. ``orders`` holds the transmission error per revolution of the load.
+    as where friction or a pull keeps the load on its flank in every move; the lost motion is then
+    its bound. ``twist_s2`` is J/k, None where it is no larger than its uncertainty;
+    ``most_twist_s2`` is its upper limit. Both are None where ``backlash_rad`` is, as they rest on
+    the same flanks, and where the load is ``pulled`` too much. ``load_inertia_kgm2`` needs the
+    motor's own inertia. ``orders`` contains the transmission error per revolution of the load.
     """
 
     counts_per_rev: float
@@ -72,7 +72,7 @@ class LoadSide:
 
 @dataclass(frozen=True)
 class _Fit:
-    """In rad of the motor: half the gap, J/k, F/k, errors over the angle, lost motion."""
+    """In rad of the motor: half the backlash, J/k, F/k, errors over the angle, lost motion."""
 
     counts_per_rad: float
     half_gap: float | None
@@ -83,12 +83,12 @@ class _Fit:
     square: float
 
     def amplitude(self, number: int) -> float:
-        """Of the error's order of this number."""
+        """Return the amplitude of the error order of this index."""
         return float(np.hypot(self.errors[2 * number], self.errors[2 * number + 1]))
 
 
 def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
-    """The figures of these samples.
+    """Evaluate these samples.
 
     Raises:
         FewSamples: too few are left.
@@ -97,7 +97,7 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
     shape = shape_of(sides)
     table = table_of(sides, shape, np.zeros(sides.angle_rad.size))
     first = _fit(table, _flanks(table))
-    # The error over the angle is in the second derivative of the counts, too: subtracted once.
+    # The error over the angle is also in the second derivative of the counts: subtract it once.
     shown = shape.columns(sides.angle_rad) @ first.errors
     table = table_of(sides, shape, first.counts_per_rad * shown)
     flanks = _flanks(table)
@@ -143,7 +143,7 @@ def load_side(sides: TwoSides, motor_inertia_kgm2: float | None) -> LoadSide:
 
 
 def _flanks(table: Table) -> FloatArray:
-    """On which flank each sample of the moves lies, ±1 [m], 0 where that is not certain."""
+    """Flank of each sample of the moves, ±1 [m], 0 where it is uncertain."""
     largest = float(np.quantile(np.abs(table.alpha[table.moves]), threshold.LARGE))
     thin = np.zeros(table.counts.size, dtype=np.bool_)
     thin[:: threshold.COARSE] = True
@@ -159,7 +159,7 @@ def _flanks(table: Table) -> FloatArray:
             fit = _fit(some, flanks)
             if fit.half_gap is None or fit.square >= least:
                 continue
-            # Flanks that would overlap are no answer, however well they fit.
+            # Overlapping flanks (negative backlash) are rejected, however well they fit.
             if 2.0 * fit.half_gap < -threshold.COUNTS / abs(fit.counts_per_rad):
                 continue
             if _agrees(some, fit, flanks, pull, largest):
@@ -168,7 +168,7 @@ def _flanks(table: Table) -> FloatArray:
 
 
 def _of(table: Table, friction: float, pull: float, largest: float) -> FloatArray:
-    """Flanks with F/J and pull/J in rad/s²."""
+    """Flanks for F/J and pull/J in rad/s²."""
     if np.isinf(friction):
         return np.where(table.moves, table.sign, 0.0)
     force = table.alpha + friction * table.sign + pull
@@ -177,25 +177,25 @@ def _of(table: Table, friction: float, pull: float, largest: float) -> FloatArra
 
 
 def _pulls(table: Table, largest: float) -> list[float]:
-    """Candidates of pull/J: none, or what the motor's torque shows of one."""
+    """Candidates of pull/J: none, or values that the motor's torque indicates."""
     at = table.moves
     columns = np.column_stack([table.alpha[at], table.sign[at], np.ones(np.count_nonzero(at))])
     inertia, _, pull = np.linalg.lstsq(columns, table.torque[at], rcond=None)[0]
     ratio = pull / inertia if inertia > 0.0 else 0.0
     if abs(ratio) < threshold.NO_PULL * largest:
         return [0.0]
-    # The load has a part of the inertia that the torque accelerates.
+    # The load has only a part of the inertia that the torque accelerates.
     return [float(ratio * factor) for factor in threshold.PULLS]
 
 
 def _pulled(table: Table) -> bool:
-    """Whether a pull takes so much of what accelerates the load that flanks hardly change."""
+    """Whether a pull is so large a part of the load's acceleration that flanks hardly change."""
     largest = float(np.quantile(np.abs(table.alpha[table.moves]), threshold.LARGE))
     return abs(_pulls(table, largest)[0]) > threshold.PULLED * largest
 
 
 def _agrees(table: Table, fit: _Fit, flanks: FloatArray, pull: float, largest: float) -> bool:
-    """Whether the friction that was found puts the load on the flanks that were assumed."""
+    """Whether the friction found puts the load on the assumed flanks."""
     gap = abs(fit.half_gap or 0.0)
     if fit.friction <= max(threshold.SMALL * gap, threshold.COUNTS / abs(fit.counts_per_rad)):
         return True
@@ -207,12 +207,12 @@ def _agrees(table: Table, fit: _Fit, flanks: FloatArray, pull: float, largest: f
 
 
 def _in_contact(table: Table, flanks: FloatArray) -> BoolArray:
-    """Samples that lie where the fit says: not those that bounce, or cross the gap."""
+    """Samples that agree with the fit, without those that bounce or cross the backlash."""
     kept = np.ones(table.counts.size, dtype=np.bool_)
     for _ in range(threshold.TRIMMED):
         rest = _residual(table, flanks, kept)
         moving = rest[kept & table.moves]
-        # Median deviation, as the standard deviation of a normal distribution.
+        # Median absolute deviation, scaled to the standard deviation of a normal distribution.
         spread = 1.4826 * np.median(np.abs(moving - np.median(moving)))
         least = threshold.COUNTS
         off = np.abs(rest) > threshold.OUTSIDE * max(spread, least)
@@ -226,14 +226,14 @@ def _in_contact(table: Table, flanks: FloatArray) -> BoolArray:
 
 
 def _design(table: Table, flanks: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Columns [m, c + 3], flank, acceleration and direction last, and the samples that count."""
+    """Columns [m, c + 3], flank, acceleration and direction last, and the samples to use."""
     on = table.moves
     own = np.column_stack([flanks, np.where(on, table.alpha, 0.0), np.where(on, table.sign, 0.0)])
     return np.hstack([table.fixed, own]), ~on | (flanks != 0.0)
 
 
 def _solved(columns: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Least squares; by the normal equations, refined once, where their condition allows."""
+    """Least squares; by the normal equations, refined once, where their condition permits."""
     size = np.sqrt(np.mean(columns**2, axis=0))
     size[size == 0.0] = 1.0
     scaled = columns / size
@@ -278,14 +278,14 @@ def _residual(table: Table, flanks: FloatArray, kept: BoolArray) -> FloatArray:
 
 
 def _load_inertia(table: Table, groups: IntArray, motor_inertia_kgm2: float | None) -> Value | None:
-    """What the torque beyond the motor's own acceleration accelerates, in kg·m²."""
+    """Load inertia in kg·m², from the torque in excess of the motor's own acceleration torque."""
     if motor_inertia_kgm2 is None:
         return None
 
     def found(at: BoolArray) -> float:
         torque = table.torque[at] - motor_inertia_kgm2 * table.motor_alpha[at]
         moves = table.moves[at]
-        # The slow passes show what the torque depends on the place by, with friction of their own.
+        # The slow passes determine the position-dependent torque, with a friction of their own.
         signs = [np.where(moves, table.sign[at], 0.0), np.where(moves, 0.0, table.sign[at])]
         own = [table.alpha[at], *signs, table.omega[at], np.ones(torque.size)]
         return float(_solved(np.column_stack([*own, table.places[at]]), torque)[0])
@@ -293,13 +293,13 @@ def _load_inertia(table: Table, groups: IntArray, motor_inertia_kgm2: float | No
     everything = np.ones(table.counts.size, dtype=np.bool_)
     again = [found(table.group != group) for group in groups]
     inertia = found(everything)
-    # The torque accelerates both: what is uncertain of their sum is uncertain of the load alone.
+    # The torque accelerates both, so the whole uncertainty of the sum belongs to the load.
     floor = threshold.SHARE_OF_INERTIA * (inertia + motor_inertia_kgm2)
     return Value(inertia, float(np.hypot(_jackknife(again), floor)))
 
 
 def _jackknife(again: Sequence[float]) -> float:
-    """Half of the 95 % interval, from the values without one group each."""
+    """Half of the 95 % interval, from the values with one group left out each."""
     values = np.array(again)
     n = values.size
     deviation = np.sqrt((n - 1) / n * np.sum((values - np.mean(values)) ** 2))

@@ -1,4 +1,4 @@
-"""Samples of both sides of a coupling, filtered and thinned: what `load_side` is fitted to."""
+"""Samples of both sides of a coupling, filtered and thinned: the data that `load_side` fits."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ BoolArray = npt.NDArray[np.bool_]
 IntArray = npt.NDArray[np.int64]
 _TURN = 2 * np.pi
 GROUP = 100
-"""Parts from this number on are groups of reciprocating moves."""
+"""Part numbers from this one on are groups of reciprocating moves."""
 
 
 class FewSamples(ValueError):
-    """Too few samples are left for an answer."""
+    """Raised if too few samples are left for a result."""
 
 
 class LoadStands(ValueError):
-    """The counts of the load do not follow the motor."""
+    """Raised if the counts of the load do not follow the motor."""
 
 
 @dataclass(frozen=True)
 class TwoSides:
     """Samples [n] of both sides: rad of the motor, counts of the load, Nm of the motor.
 
-    ``part``: 0 counts for nothing; ±j a slow pass forwards or backwards; 100 + j the j-th group of
-    reciprocating moves. ``ratio``: motor revolutions of one load revolution.
+    ``part``: 0 is not evaluated; ±j is a slow pass forwards or backwards; 100 + j the j-th group of
+    reciprocating moves. ``ratio``: motor revolutions per load revolution.
     """
 
     rate_hz: float
@@ -46,9 +46,9 @@ class TwoSides:
 
 @dataclass(frozen=True)
 class Table:
-    """Filtered and thinned samples [m]. ``fixed`` are the columns that no flank changes: motor
-    angle, errors over the angle, an offset for each direction of the slow passes, one for the
-    moves, and the speed. ``places`` are waves over the motor's revolution, for its torque."""
+    """Filtered and thinned samples [m]. ``fixed`` are the columns that do not depend on the flank:
+    motor angle, errors over the angle, the speed, an offset for each direction of the slow passes,
+    and one for the moves. ``places`` are harmonics of the motor angle, for its torque."""
 
     counts: FloatArray
     fixed: FloatArray
@@ -61,7 +61,7 @@ class Table:
     places: FloatArray
 
     def rows(self, kept: BoolArray) -> Table:
-        """Some of the samples."""
+        """Return some of the samples."""
         return Table(**{name: value[kept] for name, value in vars(self).items()})
 
     @property
@@ -72,8 +72,8 @@ class Table:
 
 @dataclass(frozen=True)
 class ErrorShape:
-    """The errors over the angle: orders per load revolution, and Chebyshev polynomials from the
-    second on, where a part of one is covered."""
+    """Basis of the errors over the angle: orders per load revolution, and Chebyshev polynomials
+    from the second on where only a part of a revolution is covered."""
 
     orders: tuple[float, ...]
     powers: int
@@ -82,7 +82,7 @@ class ErrorShape:
     span_rad: float
 
     def columns(self, angle_rad: FloatArray) -> FloatArray:
-        """[n, 2·orders + powers]"""
+        """Return the basis functions [n, 2·orders + powers] at these angles."""
         load = angle_rad / self.ratio
         waves = [f(order * load) for order in self.orders for f in (np.cos, np.sin)]
         place = 2.0 * (angle_rad - self.centre_rad) / self.span_rad
@@ -94,12 +94,12 @@ class ErrorShape:
 
 
 def shape_of(sides: TwoSides) -> ErrorShape:
-    """Which errors the slow passes can show: those of a load revolution where they cover one, of
-    a motor revolution where they cover that and it is another.
+    """Return the errors that the slow passes can show: those of a load revolution where they cover
+    one, of a motor revolution where they cover that and its orders differ.
 
     Raises:
         FewSamples: of slow passes.
-        LoadStands: the motor itself stood.
+        LoadStands: the motor itself did not move.
     """
     slow = sides.angle_rad[(sides.part != 0) & (np.abs(sides.part) < GROUP)]
     if slow.size < threshold.FEWEST:
@@ -119,7 +119,7 @@ def shape_of(sides: TwoSides) -> ErrorShape:
 
 
 def table_of(sides: TwoSides, shape: ErrorShape, error_counts: FloatArray) -> Table:
-    """Filtered and thinned; ``error_counts`` [n] are subtracted before the load's acceleration.
+    """Filter and thin the samples; ``error_counts`` [n] are subtracted for the load's acceleration.
 
     Raises:
         FewSamples: of slow passes or of groups of moves.
@@ -176,7 +176,7 @@ def table_of(sides: TwoSides, shape: ErrorShape, error_counts: FloatArray) -> Ta
 def _settled(
     sides: TwoSides, scale: float, low: Callable[[FloatArray], FloatArray], moves: BoolArray
 ) -> BoolArray:
-    """Samples [n] of the moves in whose window the load neither crosses the gap nor bounces."""
+    """Samples [n] of the moves whose window contains no crossing of the backlash and no bounce."""
     twist = (sides.load_counts - sides.load_counts[0]) / scale
     twist -= sides.angle_rad - sides.angle_rad[0]
     twist -= np.median(twist)
@@ -186,7 +186,7 @@ def _settled(
 
 
 def curve_of(sides: TwoSides, shape: ErrorShape) -> tuple[FloatArray, FloatArray]:
-    """Angles over a load revolution, or over what was covered, and the columns there."""
+    """Return angles over a load revolution, or over the covered range, and the columns there."""
     if shape.powers == 0:
         angle = np.arange(threshold.BINS) * _TURN * sides.ratio / threshold.BINS
     else:
@@ -196,7 +196,7 @@ def curve_of(sides: TwoSides, shape: ErrorShape) -> tuple[FloatArray, FloatArray
 
 
 def unwrapped(counts: FloatArray, bits: int = 32) -> FloatArray:
-    """Counts [n] of a counter that wraps around, without its leaps."""
+    """Return the counts [n] of a counter that wraps around, without the jumps."""
     turn = 2.0**bits
     steps = np.diff(counts)
     steps -= turn * np.round(steps / turn)

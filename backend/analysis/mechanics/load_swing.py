@@ -1,16 +1,16 @@
-"""Loads that swing behind their couplings, in the torque of slow moves.
+"""Loads that oscillate behind their couplings, identified from the torque of slow moves.
 
 Seen from the motor, whose acceleration is a, a chain of inertias and springs is a rigid inertia and
-one oscillator for every mode that the loads have while the motor is held (the antiresonances of
+one oscillator for every mode that the loads have with the motor held (the antiresonances of
 the mechanics; modal decomposition of a fixed-base structure, Craig & Bampton, AIAA J. 6 (1968)
 1313):
 
     T = J·a + Σ mᵢ·(Fᵢ(a) − a),   Fᵢ(s) = (2ζωs + ω²) / (s² + 2ζωs + ω²)
 
-Well below ω this is J·a and a little of a's second derivative, which a regression may take as a
-column of its own. At and above ω it is not, and a load that swings freely after a ramp takes
-torque while the motor turns steadily. Such a mode is found here, by its frequency and damping;
-mᵢ is linear. The motion of the motor is measured, so what friction does to it is no matter.
+Well below ω this is J·a and a small multiple of a's second derivative, which can be a column of a
+regression. At and above ω it is not: a load that oscillates freely after a ramp takes torque while
+the motor turns at constant speed. Frequency and damping of such a mode are searched for; mᵢ is
+linear. The motion of the motor is measured, so friction at the motor has no influence.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ from backend.analysis.thresholds import load_swing as threshold
 
 @dataclass(frozen=True)
 class Swing:
-    """A mode of the loads with the motor held: Hz, share of critical damping."""
+    """A mode of the loads with the motor held: frequency in Hz, damping ratio."""
 
     frequency_hz: float
     damping: float
 
 
 def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -> FloatArray:
-    """F(a) − a [n]: acceleration of the load less that of the motor, from rest.
+    """Return F(a) − a [n]: acceleration of the load minus that of the motor, from standstill.
 
-    Straight lines between samples (first-order hold).
+    Linear interpolation between samples (first-order hold).
     """
     w = 2 * np.pi * swing.frequency_hz
     damped = 2 * swing.damping * w
-    # As states: the load's way and speed against the motor's way, driven by the acceleration.
+    # States: displacement and velocity of the load relative to the motor, driven by the
+    # acceleration.
     states = np.array([[0.0, 1.0], [-w * w, -damped]]), np.array([[0.0], [1.0]])
     reported = np.array([[w * w, damped]]), np.array([[0.0]])
     a, b, c, d, _ = scipy.signal.cont2discrete((*states, *reported), 1.0 / sample_rate_hz, "foh")
@@ -50,7 +51,7 @@ def lag_of_load(acceleration: FloatArray, swing: Swing, sample_rate_hz: float) -
 def lag_slopes(
     acceleration: FloatArray, swing: Swing, sample_rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """How `lag_of_load` changes with the logarithms of frequency and damping, [n] each."""
+    """Return the derivatives [n] of `lag_of_load` by log frequency and by log damping."""
 
     def at(frequency: float, damping: float) -> FloatArray:
         moved = Swing(swing.frequency_hz * frequency, swing.damping * damping)
@@ -72,10 +73,11 @@ def find_swings(
     highest_hz: float,
     most: int = 2,
 ) -> tuple[Swing, ...]:
-    """Modes up to ``highest_hz`` that the torque [n] shows next to ``others`` [n, columns].
+    """Return the modes up to ``highest_hz`` that the torque [n] shows besides ``others`` [n,
+    columns].
 
-    ``others`` begins with the acceleration. A mode counts only while it takes half of what was
-    left unexplained, as an inertia that is positive and smaller than the whole.
+    ``others`` begins with the acceleration. A mode is accepted only if it explains half of the
+    remaining residual, with an inertia that is positive and smaller than the whole.
     """
     every = max(1, int(sample_rate_hz / (threshold.PER_CYCLE * highest_hz)))
     rows = np.flatnonzero(keep)[::every]
@@ -127,7 +129,7 @@ class _Problem:
         return np.column_stack(lags)
 
     def residual(self, swings: tuple[Swing, ...]) -> FloatArray:
-        """What is left of the torque [rows]."""
+        """Return the unexplained torque [rows]."""
         if not swings:
             return self._rest
         columns = self._without_others(self._columns(swings))
@@ -138,7 +140,7 @@ class _Problem:
         return float(np.sum(self.residual(swings) ** 2))
 
     def refined(self, swings: tuple[Swing, ...], highest_hz: float) -> tuple[Swing, ...]:
-        """The nearest minimum, searched over the logarithms of frequency and damping."""
+        """Return the nearest minimum over the logarithms of frequency and damping."""
 
         def of(q: FloatArray) -> tuple[Swing, ...]:
             return tuple(Swing(float(f), float(z)) for f, z in np.exp(q).reshape(-1, 2))
@@ -156,7 +158,7 @@ class _Problem:
         return of(best.x)
 
     def is_physical(self, swings: tuple[Swing, ...]) -> bool:
-        """Every inertia positive, and together no more than the whole."""
+        """Return whether every inertia is positive, and their sum no more than the whole."""
         columns = self._columns(swings)
         x = np.linalg.lstsq(np.column_stack([self._others, columns]), self._torque, rcond=None)[0]
         whole = x[0] / self._inertia_scale

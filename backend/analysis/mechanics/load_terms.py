@@ -1,11 +1,10 @@
-"""Torques that some machines need in addition to inertia and friction, shown by the moves
-themselves.
+"""Torques of some machines in addition to inertia and friction, detected from the moves.
 
 A fan, a pump or a stirrer takes a torque that grows with the square of its speed; a spring, an arm
-or a load out of balance one that depends on the place (`place_torque`); and friction is larger near
-standstill (Stribeck 1902). Left out, they pass for inertia, for play, or turn friction negative. A
-term is accepted only where it clearly explains what the
-others leave, so that an axis without it is judged as if there were no such thing.
+or an unbalanced load one that depends on the position (`position_torque`); and friction is larger
+near standstill (Stribeck 1902). If omitted, they appear as inertia, as backlash, or make friction
+negative. A term is accepted only where it clearly explains what the others leave, so that an axis
+without it is evaluated as if the term did not exist.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from backend.analysis.thresholds import load_terms as threshold
 
 @dataclass(frozen=True)
 class Motion:
-    """Speed [n] in rad/s, place [n] in rad, and the smoothing that every signal goes through."""
+    """Speed [n] in rad/s, position [n] in rad, and the smoothing applied to every signal."""
 
     velocity_rad_s: FloatArray
     angle_rad: FloatArray
@@ -35,10 +34,10 @@ class Motion:
 
 @dataclass(frozen=True)
 class FoundTerms:
-    """What the terms come to: the largest torque of a fan in the recording, half the span of what
-    the machine takes by its place, in Nm; 0 where there is none.
+    """Sizes of the terms in Nm: the largest torque of a fan in the recording, and half the span of
+    the position-dependent torque of the machine; 0 where there is none.
 
-    ``torque_nm`` [n] is what all of them make of the torque of the recording, static friction and
+    ``torque_nm`` [n] is the torque of all terms over the recording, static friction and
     the motor's cogging included; empty where none is found.
     """
 
@@ -53,10 +52,10 @@ NO_LOAD_TERMS = FoundTerms(0.0, 0.0, (), np.empty(0))
 
 @dataclass(frozen=True)
 class Terms:
-    """What the torque is made of in addition to inertia and friction.
+    """Terms of the torque in addition to inertia and friction.
 
     ``static_rad_s`` is the speed within which static friction falls, 0 where there is none;
-    ``periods_rad`` are those of torques that depend on the place.
+    ``periods_rad`` are those of torques that depend on the position.
     """
 
     fan: bool = False
@@ -64,7 +63,7 @@ class Terms:
     periods_rad: tuple[float, ...] = ()
 
     def columns(self, motion: Motion) -> FloatArray:
-        """Their shapes [n, columns]: a fan's, static friction's, then two for each period."""
+        """Return the shapes [n, columns]: a fan's, static friction's, then two for each period."""
         velocity = motion.velocity_rad_s
         parts: list[FloatArray] = [np.empty((velocity.size, 0))]
         if self.fan:
@@ -76,19 +75,20 @@ class Terms:
         return np.column_stack(parts)
 
     def may_hide(self, before: Terms) -> bool:
-        """Whether what these have more than ``before`` is accepted next to noise, too."""
+        """Return whether the term added to ``before`` is also accepted near the noise level."""
         if self.static_rad_s != before.static_rad_s:
             return False
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
 
     def sized(self, motion: Motion, sizes: FloatArray) -> FoundTerms:
-        """What they come to; ``sizes`` begins with those of `columns`."""
+        """Return the sizes of the terms; ``sizes`` begins with the coefficients of `columns`."""
         columns = self.columns(motion)
         if not columns.shape[1]:
             return NO_LOAD_TERMS
         made = columns * sizes[: columns.shape[1]]
         at = int(self.fan) + int(self.static_rad_s > 0)
-        # What repeats more than twice in a turn is the motor's own cogging, not the machine's.
+        # Torques that repeat more than twice per turn are the motor's own cogging, not the
+        # machine's.
         reported = [i for i, period in enumerate(self.periods_rad) if period > COGGING_RAD]
         place = sum(made[:, at + 2 * i] + made[:, at + 2 * i + 1] for i in reported)
         return FoundTerms(
@@ -99,7 +99,7 @@ class Terms:
         )
 
     def slopes(self, motion: Motion) -> list[FloatArray]:
-        """How the shapes change with the logarithm of their period, [n] each."""
+        """Return the derivatives of the shapes by the logarithm of their period, [n] each."""
         found: list[FloatArray] = []
         for period in self.periods_rad:
             ahead, behind = (
@@ -111,9 +111,9 @@ class Terms:
 
 
 def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: BoolArray) -> Terms:
-    """The terms that the torque [n] shows next to ``others`` [n, columns].
+    """Return the terms that the torque [n] shows besides ``others`` [n, columns].
 
-    The third of ``others`` is the direction of motion, whose size is the Coulomb friction.
+    The third of ``others`` is the direction of motion, whose coefficient is the Coulomb friction.
     """
     largest = float(np.max(np.abs(torque_nm[keep])))
     fastest = float(np.max(np.abs(motion.velocity_rad_s)))
@@ -148,7 +148,7 @@ def find_terms(others: FloatArray, torque_nm: FloatArray, motion: Motion, keep: 
 
 @dataclass(frozen=True)
 class _Fit:
-    """What terms leave of the torque [rows], and whether they are large enough to matter."""
+    """Residual torque [rows] with these terms, and whether the terms are large enough to matter."""
 
     terms: Terms
     rest: FloatArray
@@ -160,7 +160,7 @@ class _Fit:
 
 
 def _clearly(before: _Fit, after: _Fit, keep: BoolArray) -> bool:
-    """Whether the second explains so much more that chance is not the reason."""
+    """Whether the second fit explains significantly more than chance."""
     taken = before.power - after.power
     if taken > threshold.PLAIN * before.power:
         return True
@@ -173,7 +173,7 @@ def _clearly(before: _Fit, after: _Fit, keep: BoolArray) -> bool:
 
 
 def independent_share(residual: FloatArray, keep: BoolArray) -> float:
-    """Share of samples that are independent, from the residual's autocorrelation."""
+    """Return the share of independent samples, from the residual's autocorrelation."""
     whole = np.zeros(keep.size)
     whole[keep] = residual
     n = 1 << int(np.ceil(np.log2(2 * keep.size)))

@@ -1,7 +1,7 @@
-"""A continuous model of mechanics driven and measured at the motor.
+"""Continuous model of mechanics driven and measured at the motor.
 
 A rigid part and modes with positive residues, G(s) = g/(s + p) + Σ α_i·(s + β_i)/(s² + 2·ζ_i·ω_i·s
-+ ω_i²). Such a sum cannot imitate a delay, which is why a delay can be found together with it.
++ ω_i²). Such a sum cannot imitate a delay, so a delay can be identified together with it.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class MechanicalModel:
     modes: tuple[Mode, ...] = ()
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex response without any delay."""
+        """Return the complex response without any delay."""
         s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
         out = self.gain / (s + self.pole_rad_s)
         for mode in self.modes:
@@ -45,23 +45,23 @@ class MechanicalModel:
         return np.asarray(out, dtype=np.complex128)
 
     def without(self, mode: Mode) -> MechanicalModel:
-        """The rest of the model."""
+        """Return the model without this mode."""
         return replace(self, modes=tuple(m for m in self.modes if m is not mode))
 
     def height_db(self, mode: Mode) -> float:
-        """How far a mode rises above the rest of the model at its own frequency."""
+        """Return the height of a mode above the rest of the model at its own frequency, dB."""
         at = np.array([mode.frequency_hz])
         ratio = np.abs(self.response(at)[0]) / np.abs(self.without(mode).response(at)[0])
         return float(20 * np.log10(max(float(ratio), 1e-6)))
 
     def prominence(self, mode: Mode) -> float:
-        """A mode's own part of the response at its frequency, relative to all the rest."""
+        """Return a mode's own part of the response at its frequency, relative to the rest."""
         at = np.array([mode.frequency_hz])
         rest = self.without(mode).response(at)[0]
         return float(np.abs(self.response(at)[0] - rest) / np.abs(rest))
 
     def numerator(self) -> FloatArray:
-        """Numerator polynomial in s, highest power first."""
+        """Return the numerator polynomial in s, highest power first."""
         denominators = [
             np.array([1.0, 2 * m.damping * TURN * m.frequency_hz, (TURN * m.frequency_hz) ** 2])
             for m in self.modes
@@ -74,13 +74,13 @@ class MechanicalModel:
         return np.asarray(total, dtype=np.float64)
 
     def antiresonances(self) -> tuple[tuple[float, float], ...]:
-        """(frequency in Hz, damping) of the complex zeros, ascending."""
+        """Return (frequency in Hz, damping) of the complex zeros, ascending."""
         zeros = np.roots(self.numerator())
         pairs = [(abs(z) / TURN, -z.real / abs(z)) for z in zeros if z.imag > 1e-6 * abs(z)]
         return tuple(sorted((float(f), float(d)) for f, d in pairs))
 
     def perturbed(self, frequency_factor: float, damping_factor: float) -> MechanicalModel:
-        """All modes moved in frequency (stiffness) and damping; the inertias stay."""
+        """Return the model with all modes scaled in frequency (stiffness) and damping only."""
         return replace(
             self,
             modes=tuple(
@@ -103,14 +103,14 @@ def _product(polynomials: list[FloatArray]) -> FloatArray:
 
 # --- parameters of a fit ----------------------------------------------------------------
 
-#: Gain, pole, two delays and the speed filter's log corner come before the modes' four each.
+#: Parameters before those of the modes: gain, pole, two delays and the speed filter's log corner.
 RIGID_PARAMETERS = 5
 MODE_PARAMETERS = 4
 
 
 def model_of(x: FloatArray) -> MechanicalModel:
-    """Parameters to a model: log gain, log pole, (path), and per mode log frequency, log
-    damping, log residue and β/ω; logarithms, so that what is positive stays so.
+    """Return the model of the parameters: log gain, log pole, (path), and per mode log frequency,
+    log damping, log residue and β/ω; the logarithms keep the values positive.
     """
     modes = tuple(
         Mode(
@@ -127,7 +127,7 @@ def model_of(x: FloatArray) -> MechanicalModel:
 def response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response [...] of `model_of` (x), and its slope [n parameters, ...] (zero for the path)."""
+    """Return the response [...] of `model_of` (x), and its slopes [n, ...], 0 for the path."""
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
     gain, pole = np.exp(x[0]), np.exp(x[1])
     rigid = gain / (s + pole)

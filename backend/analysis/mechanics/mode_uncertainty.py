@@ -1,14 +1,14 @@
-"""How exactly a fit shows its modes: frequency, damping and part in the response.
+"""Uncertainty of the modes of a fit: frequency, damping and residue.
 
-The covariance of the fit's parameters carried over to the modes by their slopes (Pintelon &
-Schoukens, *System Identification*, 2012, section 2.4), and next to it what all lines may be off by
-together, which no covariance of single lines shows: the friction that was removed from them acts
-like damping, by the same share everywhere.
+The covariance of the fit's parameters is propagated to the modes by their slopes (Pintelon &
+Schoukens, *System Identification*, 2012, section 2.4). In addition, all lines may have a common
+error, which no covariance of single lines shows: the friction that was removed from them acts like
+damping, with the same share on every line.
 
-What friction adds to the damping of a mode is the same however much that mode is damped by itself;
-and lines next to a mode that is narrower than their distance show its damping by their phase, in
-proportion. So the range of a damping is stated by what is added to it and not as a factor, and
-where it is not known to half of itself it begins at zero.
+The damping that friction adds to a mode does not depend on the mode's own damping; and lines next
+to a mode that is narrower than their spacing show its damping by their phase, proportionally.
+Therefore the range of a damping ratio is stated as a sum and not as a factor, and it begins at zero
+where the uncertainty exceeds half of the value.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _UNSEEN_FRICTION = np.array(threshold.UNSEEN_FRICTION)
 
 @dataclass(frozen=True)
 class ModeUncertainty:
-    """One standard deviation each, relative: frequency, damping and residue of a mode."""
+    """One relative standard deviation each of frequency, damping and residue of a mode."""
 
     frequency: float
     damping: float
@@ -42,10 +42,11 @@ class ModeUncertainty:
         distortion: FloatArray,
         by_place: FloatArray | None,
     ) -> ModeUncertainty:
-        """Wider by what the model leaves open: ``distortion`` and ``by_place`` [lines] of the band.
+        """Return a larger uncertainty, by ``distortion`` and ``by_place`` [lines] of the band.
 
-        A line's phase next to a mode turns by 1/damping of a relative change of its frequency. An
-        inertia moves a frequency by half of what it moves the lines above it, as its root.
+        The phase of a line next to a mode turns by 1/damping of a relative change of its frequency.
+        A change of inertia shifts a frequency by half of its relative effect on the lines above it
+        (square root).
         """
         phase = float(np.interp(mode.frequency_hz, frequency_hz, distortion))
         above = frequency_hz > mode.frequency_hz
@@ -61,7 +62,7 @@ class ModeUncertainty:
         )
 
     def damping_interval(self, damping: float, deviations: float) -> tuple[float, float]:
-        """Within so many deviations of a damping ratio."""
+        """Return the range of a damping ratio within this number of standard deviations."""
         apart = deviations * min(self.damping, threshold.WIDEST)
         return damping * max(1.0 - apart, 0.0), damping * (1.0 + apart)
 
@@ -74,9 +75,9 @@ def mode_uncertainties(
     *,
     friction_seen: bool,
 ) -> tuple[ModeUncertainty, ...]:
-    """For each mode of the model at ``x``, in its order.
+    """Return the uncertainties of the modes of the model at ``x``, in its order.
 
-    ``covariance`` is that of ``x``; ``together`` are, per view, one deviation [lines] of the
+    ``covariance`` is that of ``x``; ``together`` contains, per view, one deviation [lines] of the
     logarithm that is common to all lines; ``friction_seen`` whether friction was removed.
     """
     here = _modes(problem, x)
@@ -104,7 +105,7 @@ def _modes(problem: Problem, x: FloatArray) -> FloatArray:
 
 
 def _step_of(problem: Problem, x: FloatArray, together: Sequence[ComplexArray]) -> FloatArray:
-    """How far the best parameters move when all measured lines do."""
+    """Change of the best parameters for a common change of all measured lines."""
     residuals, jacobian = problem.misfit(x)
     rows = np.zeros(residuals.size)
     parts = []

@@ -1,8 +1,8 @@
-"""Mechanics and delay from direct estimates, images included.
+"""Fit of mechanics and delay to direct estimates, images included.
 
-A chain grows load by load where a search over all ways to add one finds that one is missing, as
-long as the Bayesian information criterion gains (Schwarz, Ann. Statist. 6 (1978) 461). What no
-chain explains (damping elsewhere than next to a spring) a free sum of modes may, from there.
+A chain is extended load by load, found by a search over all ways to add one, as long as the
+Bayesian information criterion improves (Schwarz, Ann. Statist. 6 (1978) 461). What no chain
+explains (damping other than in parallel with a spring) is fitted by a free sum of modes from there.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ from backend.analysis.thresholds import model_fit as threshold
 
 @dataclass(frozen=True)
 class Solution:
-    """A fit and what it was made of, for what follows from its parameters.
+    """A fit with its problem and parameters, for further evaluation.
 
-    The problem's views have all lines, those that took no part in the fit with a weight of zero.
+    The problem's views have all lines; those not used in the fit have weight zero.
     """
 
     fit: SampledFit
@@ -63,10 +63,10 @@ def fit_sampled_model(
 
     ``frf`` is a direct estimate made with ``path`` from the velocity, ``from_position`` one from
     the position of the same recording, with the same lines; one of them may be None. Lines up to
-    0.4 of the sample rate with enough coherence take part. A delay is looked for within
-    ``longest_delay_s`` (three bus cycles in torque mode, a quarter of one in a closed loop)
-    where none explains nothing. With ``start`` only the numbers of another solution are refined.
-    ``inertia`` is the whole axis', where moves have shown it.
+    0.4 of the sample rate with enough coherence are used. Where no fit without a delay explains the
+    data, a delay up to ``longest_delay_s`` is searched for (default: three bus cycles in torque
+    mode, a quarter of one in a closed loop). With ``start`` only the parameters of another solution
+    are refined. ``inertia`` is that of the whole axis, where moves have shown it.
 
     Raises:
         ValueError: too few lines are coherent.
@@ -81,7 +81,7 @@ def fit_sampled_model(
     loop = LoopModel() if loop is None else loop
     period_s = 1.0 / path.sample_rate_hz
     if longest_delay_s is None:
-        # Torque and velocity are reported together: only injection itself can be cycles late.
+        # Torque and velocity are reported together: only the injection itself can be cycles late.
         longest_delay_s = 0.25 * period_s if loop.closed else 3 * period_s
     all_views = views_of(frf, from_position, path, loop, use)
     views = tuple(view.thinned(np.flatnonzero(use)) for view in all_views)
@@ -120,7 +120,7 @@ def views_of(
     loop: LoopModel,
     use: BoolArray | None = None,
 ) -> tuple[View, ...]:
-    """The estimates as the fit sees them, all lines; those not in ``use`` weigh nothing."""
+    """Return the estimates as the fit uses them; lines not in ``use`` have weight zero."""
     given = [part for part in (frf, from_position) if part is not None]
     if use is None:
         use = np.ones(given[0].frequency_hz.size, dtype=np.bool_)
@@ -147,11 +147,11 @@ def _spread(found: Found) -> FloatArray:
 
 
 def _best(chain: Problem, longest_delay_s: float, max_modes: int) -> tuple[Found, Form]:
-    """The chain that the criterion likes best, or modes where they gain much over it."""
+    """The chain with the best criterion, or free modes where they are much better."""
     views, period_s = chain.views, chain.period_s
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
     if found.error > 0.05:
-        # Perhaps there is a delay that no path showed.
+        # There may be a delay that no path shows.
         late = np.arange(0.25 * period_s, longest_delay_s + 1e-9, 0.25 * period_s) / period_s
         tried = [_grown(chain, _rigid_start(views[0], float(d)), 1) for d in late]
         start = min([found, *tried], key=lambda t: t.score)
@@ -176,7 +176,7 @@ def _rigid_start(view: View, delay: float) -> FloatArray:
 
 
 def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
-    """Loads one by one as long as the criterion gains."""
+    """Add loads one by one as long as the criterion improves."""
     problem = replace(problem, anchor=start[2:RIGID_PARAMETERS])
     best = now = problem.solve(start, bound=True)
     misses = 0
@@ -187,14 +187,14 @@ def _grown(problem: Problem, start: FloatArray, max_modes: int) -> Found:
             best, misses = now, 0
         else:
             misses += 1
-        # What is explained this well hides nothing behind a load that alone gains little.
+        # With so small a misfit, no further load can be hidden behind one that alone gains little.
         if misses == 2 or (misses and best.error < threshold.EXPLAINED) or best.error < 0.0004:
             break
     return problem.solve(best.x)
 
 
 def _best_end(problem: Problem, now: Found, starts: list[FloatArray]) -> Found:
-    """Where the starts lead: all of them on few lines first, the best on all lines."""
+    """The best solution from the starts: all of them on few lines first, the best on all lines."""
     coarse = problem.thinned(
         informative_lines(best_view(problem.views), now, threshold.COARSE_LINES)
     )

@@ -1,15 +1,15 @@
-"""Torque that depends on where the axis is: springs, arms, loads out of balance, cogging.
+"""Position-dependent torque: springs, arms, unbalanced loads, cogging.
 
 An arm on a gear needs T = A·sin(kθ + φ) to be held, an unbalanced rotor the same with one period
-to a turn, and a spring or a counterweight on a lever is that sine where it is nearly straight. One
-family therefore serves all of them, linear in A·cos φ and A·sin φ and searched over the period.
-The cogging of a motor and what its magnets and slots do else repeats a whole number of times in a
-turn.
+per turn, and a spring or a counterweight on a lever is that sine where it is nearly straight. One
+family therefore covers all of them, linear in A·cos φ and A·sin φ and searched over the period.
+The cogging of a motor, and other effects of its magnets and slots, repeat a whole number of times
+per turn.
 
-An axis that is accelerated at one end of its way and braked at the other has the sign of its
-acceleration tied to its place, so that such a torque, left out, passes for inertia: a pull that
-grows along the way makes J too small. Moves of different accelerations over one way show the two
-apart.
+On an axis that accelerates at one end of its travel and brakes at the other, the sign of the
+acceleration is correlated with the position, so that such a torque, if omitted, appears as inertia:
+a pull that grows along the travel makes J too small. Moves at different accelerations over the same
+travel separate the two.
 """
 
 from __future__ import annotations
@@ -24,23 +24,23 @@ from backend.analysis.thresholds import position_torque as threshold
 
 _TURN = 2 * np.pi
 _ORDERS = range(2, 31)
-#: Shorter periods than this, in rad, are the motor's own.
+#: Periods shorter than this, in rad, belong to the motor itself.
 COGGING_RAD = 0.45 * _TURN
 
 Smooth = Callable[[FloatArray], FloatArray]
 
 
 def angle_of(velocity_rad_s: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """Places of the motor [n] in rad, out of its speed."""
+    """Return the motor angle [n] in rad, integrated from its speed."""
     steps = 0.5 * (velocity_rad_s[1:] + velocity_rad_s[:-1]) / sample_rate_hz
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def place_columns(angle_rad: FloatArray, period_rad: float, smooth: Smooth) -> FloatArray:
-    """The two shapes of a torque of this period along the axis [n, 2], as ``smooth`` leaves them.
+    """Return sine and cosine of a torque of this period [n, 2], after ``smooth``.
 
-    The mean over the recording is removed: it belongs to the constant torque. What passes in
-    less than four samples is left out, as its samples would indicate a slower one.
+    The mean over the recording is removed: it belongs to the constant torque. Where a period takes
+    less than four samples the shape is set to zero, as aliasing would indicate a slower one.
     """
     phase = _TURN / period_rad * angle_rad
     seen = np.abs(np.gradient(phase)) < 0.25 * _TURN
@@ -55,9 +55,10 @@ def find_period(
     keep: BoolArray,
     smooth: Smooth,
 ) -> float:
-    """The period in rad that explains most of the torque [n] next to ``others`` [n, columns].
+    """Return the period in rad that explains most of the torque [n] besides ``others`` [n,
+    columns].
 
-    Whether it is worth having, the caller judges.
+    The caller must check whether it is significant.
     """
     rows = np.flatnonzero(keep)
     rows = rows[:: max(1, rows.size // threshold.ROWS)]

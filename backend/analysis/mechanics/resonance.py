@@ -8,10 +8,9 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Resonance:
-    """A row of the resonance table; ``height_db`` is how far it rises (or falls) locally.
+    """A row of the resonance table; ``height_db`` is its local height (negative: depth).
 
-    ``frequency_ci95_hz`` and ``damping_ci95`` hold the true values in 95 of 100 cases; None where
-    nothing was said of that.
+    ``frequency_ci95_hz`` and ``damping_ci95`` are 95 % intervals; None where they are unknown.
     """
 
     kind: Literal["resonance", "antiresonance"]

@@ -1,4 +1,4 @@
-"""Which resonances and antiresonances of a fitted model a measurement shows."""
+"""Resonances and antiresonances of a fitted model that a measurement shows."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import resonance_table as threshold
 
-#: A mode whose part in the response is not known to this (logarithm, one deviation) may be none.
+#: A mode with a larger standard deviation of its log residue than this may not exist.
 _UNSURE = 1.0 / 3.0
-#: Deviations to either side that hold 95 of 100 cases.
+#: Standard deviations to either side of a value that give a 95 % interval.
 _CI95 = 1.96
 
 
@@ -22,11 +22,12 @@ def resonance_table(
     highest_hz: float,
     uncertainties: tuple[ModeUncertainty, ...] = (),
 ) -> tuple[Resonance, ...]:
-    """Resonances and antiresonances that the lines show, ascending; heights are local, in dB.
+    """Return the resonances and antiresonances that the lines show, ascending; heights are local,
+    dB.
 
-    A mode that hardly rises, or that no line shows because it is narrower than what lies between
-    two of them, explains noise; so does one whose own part may as well be nothing, by
-    ``uncertainties`` (one for each mode, or none).
+    A mode that hardly rises, or that lies between two lines and is narrower than their spacing, may
+    only explain noise; so may one whose residue may be zero, by ``uncertainties`` (one for each
+    mode, or none). They are left out.
     """
     rows: list[Resonance] = []
     for number, mode in enumerate(model.modes):

@@ -1,11 +1,11 @@
-"""What friction did while the speed reversed, from the balance of torques.
+"""Friction while the speed reverses, from the balance of torques.
 
-Between two samples an axis that reverses may stop, stick and start again: its sampled speed shows
-the mean of the friction's sign there to about a third only, and 50 such reversals a second leave
-a tenth of the friction in the data. The torques show it better. What drove the motor, less what
-its own inertia took and what the mechanics behind it drew, is the friction; where the speed does
-not reverse it must come out as plus or minus the whole Coulomb torque, which shows how exactly the
-balance is known, and takes out of it what is slow (gravity, what the mechanics are off by).
+Between two samples a reversing axis may stop, stick and start again: its sampled speed shows the
+mean of the friction's sign there to within about a third only, and 50 such reversals a second leave
+a tenth of the friction in the data. The torques show it better. The torque on the motor, minus that
+of its own inertia and that taken by the mechanics behind it, is the friction. Where the speed does
+not reverse, it must equal plus or minus the whole Coulomb torque; that shows the accuracy of the
+balance, and removes its slow errors (gravity, errors of the mechanics).
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ def with_balanced_reversals(
     coulomb_nm: float,
     lag_s: float,
 ) -> tuple[Record, ...]:
-    """The records with directions of motion that the balance of torques shows, by this fit.
+    """Return the records with directions of motion from the balance of torques, by this fit.
 
-    ``lag_s`` is how late the speed is reported (:func:`line_spectra.speed_lag_s`). They are as
-    they were where there is no friction or no inertia at the motor, where samples are missing, and
-    where the balance shows less than the speed: behind a coarse encoder, or with mechanics that
-    the fit has not right.
+    ``lag_s`` is the lag of the reported speed (:func:`line_spectra.speed_lag_s`). The records are
+    unchanged where there is no friction or no inertia at the motor, where samples are missing, and
+    where the balance is less accurate than the speed: behind a coarse encoder, or with mechanics
+    that the fit does not describe well.
     """
     by_torque = sum(mode.residue for mode in fit.model.modes) + fit.model.gain
     missing = any(r.valid is not None and not np.all(r.valid) for r in records)
@@ -78,17 +78,17 @@ def _reported(
     weight = 1.0 / (1.0 + (spread / threshold.ROUGH) ** 4)
     if weight < threshold.LEAST_WEIGHT:
         return None
-    # Cut above one only: what noise adds would else no longer cancel.
+    # Clipped only above one: otherwise noise would no longer cancel in the mean.
     most = 1.0 + spread
     reported = np.clip(left_nm / coulomb_nm - wrong - mean, -most, most)
     return np.where(steady, sign, weight * reported + (1.0 - weight) * by_speed)
 
 
 def _between(off: FloatArray, known: BoolArray, wanted: BoolArray) -> tuple[FloatArray, float]:
-    """What the balance is off by at ``wanted`` [n], from ``known``, and the deviation of that.
+    """Error of the balance at ``wanted`` [n], predicted from ``known``, and its standard deviation.
 
-    By the correlation of what is known, as Wiener's filter does it: what is slow or swings at one
-    frequency (mechanics that the fit has not quite right) goes on through a reversal.
+    By the correlation of the known errors, as in a Wiener filter: errors that are slow or oscillate
+    at one frequency (mechanics that the fit describes inexactly) continue through a reversal.
     """
     count = known.astype(np.float64)
     size = scipy.fft.next_fast_len(off.size + 2 * threshold.SLOW, real=True)
@@ -119,9 +119,9 @@ def _between(off: FloatArray, known: BoolArray, wanted: BoolArray) -> tuple[Floa
 def _motion(
     record: Record, quantity: Quantity, fit: SampledFit, motor_kgm2: float
 ) -> tuple[FloatArray, FloatArray]:
-    """True velocity at the samples, and the mean torque that goes elsewhere than into the motor.
+    """True velocity at the samples, and the mean torque that does not accelerate the motor.
 
-    That is what hangs on the motor draws, less what the drive's own loop makes.
+    That is the torque taken by the load, minus the torque of the drive's own loop.
     """
     n, rate = record.response.size, fit.path.sample_rate_hz
     size = scipy.fft.next_fast_len(2 * n, real=True)
@@ -137,7 +137,7 @@ def _motion(
 
     torque = inside * drawn(f) * mean(f) + folded * drawn(f - rate) * mean(f - rate)
     if quantity == "torque_injection":
-        # The loop's torque is sampled, too: what of it is folded is what the loop makes of that.
+        # The loop's torque is sampled as well: its aliased part follows from the aliased velocity.
         own = np.fft.rfft(own_torque(record, fit.path), size)
         there = -_loop_response(fit, f - rate) * folded
         torque = torque - (own - there) * mean(f) - there * mean(f - rate)
@@ -148,11 +148,11 @@ def _motion(
 def _bands(
     record: Record, fit: SampledFit, f: FloatArray, size: int
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Spectra [bins] of the true velocity at ``f`` and at what is folded there from f - fs.
+    """Spectra [bins] of the true velocity at ``f`` and of the part folded there from f - fs.
 
-    Speed and position are samples of one motion that are folded differently, so that both
-    together show twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652). Without a
-    position nothing is known of what is folded.
+    Speed and position are samples of one motion with different aliasing, so that both together
+    determine twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652). Without a
+    position the folded part is unknown and taken as zero.
     """
     rate, corner = fit.path.sample_rate_hz, fit.path.response_bandwidth_hz
     reported_s = fit.path.response_delay_s
@@ -171,7 +171,7 @@ def _bands(
 
 
 def _loop_response(fit: SampledFit, f: FloatArray) -> ComplexArray:
-    """From the true velocity to the torque that the loop takes away for it."""
+    """Response from the true velocity to the torque that the loop subtracts for it."""
     path = fit.path
     late = delay_response(f, path.loop_delay_s) * lag_response(f, path.current_bandwidth_hz)
     return np.asarray(fit.loop.response(f) * late * lag_response(f, path.response_bandwidth_hz))
@@ -186,7 +186,7 @@ def _mean_injected(record: Record, path: SignalPath) -> FloatArray:
         before = np.concatenate([[0.0], sent[:-1]])
         part = (np.arange(fine) + 1.0) / fine
         steps = (before[:, None] + part * (sent - before)[:, None]).ravel()
-        # A step comes half of its length before the line that it stands for.
+        # A step comes half of its length before the line segment that it represents.
         late_s += STEP_LEAD_S
     else:
         steps = np.repeat(sent, fine)

@@ -21,9 +21,9 @@ Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where it ended. ``cost`` is Σ s²·(√(1+(r/s)²) - 1), for small r half the sum of squares.
+    """The minimum found. ``cost`` is Σ s²·(√(1+(r/s)²) - 1), for small r half the sum of squares.
 
-    ``residuals`` [n] are plain, ``jacobian`` [n, m] has rows weighted as the loss does.
+    ``residuals`` [n] are unweighted, the rows of ``jacobian`` [n, m] are weighted as in the loss.
     """
 
     x: FloatArray
@@ -36,11 +36,11 @@ def minimise(
     evaluate: Evaluate, start: FloatArray, low: FloatArray, high: FloatArray, *,
     scale: float, steps: int = 40, cost_tolerance: float = 1e-4, step_tolerance: float = 1e-5,
 ) -> Minimum:  # fmt: skip
-    """Least cost near ``start`` within ``low`` and ``high``.
+    """Minimise the cost near ``start`` within ``low`` and ``high``.
 
-    ``evaluate`` gives residuals [n] and their slopes [n, m]; residuals much beyond ``scale``
+    ``evaluate`` returns residuals [n] and their slopes [n, m]; residuals much beyond ``scale``
     count linearly. It ends when the cost falls by less than its tolerance (relative), when steps
-    get small, or after ``steps`` evaluations.
+    become small, or after ``steps`` evaluations.
     """
     x = np.clip(start, low, high)
     r, slopes = evaluate(x)
@@ -52,7 +52,7 @@ def minimise(
         weighted = slopes * weight[:, None]
         gradient = weighted.T @ r
         hessian = weighted.T @ slopes
-        # What a bound holds, and would be pushed through it, takes no part.
+        # A parameter at its bound whose step would cross it is kept fixed.
         free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
         if not free.any():
             break

@@ -28,18 +28,18 @@ class Fit:
     exponent: float = 1.0
 
     def at(self, speed: FloatArray) -> FloatArray:
-        """Torque [n] at signed speeds."""
+        """Return the torque [n] at signed speeds."""
         return np.asarray(_columns(speed, self.speed, self.exponent) @ self.values)
 
     def slope(self, speed: float) -> float:
-        """Torque per speed at a signed speed that is not 0, over 2 % of it."""
+        """Return the slope of torque over speed at a signed speed other than 0, over 2 % of it."""
         near = self.at(speed * np.array([0.99, 1.01]))
         return float((near[1] - near[0]) / (0.02 * speed))
 
 
 @dataclass(frozen=True)
 class SpeedModel:
-    """Points [n] with half their intervals, the best fit, and those that are as good."""
+    """Points [n] with half their intervals, the best fit, and all fits that are equally good."""
 
     speed: FloatArray
     torque: FloatArray
@@ -50,19 +50,19 @@ class SpeedModel:
 
     @property
     def enough(self) -> bool:
-        """Whether there are speeds enough to look for a Stribeck curve."""
+        """Whether there are enough speeds to look for a Stribeck curve."""
         return self.speeds >= threshold.FEWEST
 
     @property
     def reached(self) -> bool:
-        """Whether speeds were slow enough to say how high the Stribeck curve goes."""
+        """Whether the speeds were low enough to determine the height of the Stribeck curve."""
         if self.best.speed is None:
             return False
         least = float(np.min(np.abs(self.speed)))
         return bool(np.exp(-((least / self.best.speed) ** self.best.exponent)) >= threshold.NEAR)
 
     def value(self, index: int) -> tuple[float, float, float]:
-        """Load, Coulomb, viscous or Stribeck torque (0 to 3) with its 95 % interval."""
+        """Return load, Coulomb, viscous or Stribeck torque (0 to 3) with its 95 % interval."""
         freedom = max(self.speed.size - self.best.values.size, 1)
         times = float(scipy.special.stdtrit(freedom, 0.975))
         values = np.array([each.values[index] for each in self.alike])
@@ -74,10 +74,10 @@ class SpeedModel:
         )
 
     def stribeck_speed(self) -> tuple[float, float, float]:
-        """Where the Stribeck curve has fallen to 1/e, with its 95 % interval.
+        """Return the speed at which the Stribeck curve has fallen to 1/e, with its 95 % interval.
 
         Raises:
-            ValueError: there is none.
+            ValueError: no Stribeck curve was found.
         """
         if self.best.speed is None:
             raise ValueError("no Stribeck curve was found")
@@ -88,16 +88,17 @@ class SpeedModel:
         return self.best.speed, float(min(speeds) / half), float(max(speeds) * half)
 
     def misfit(self) -> float:
-        """Largest share of its torque by which a point differs; 0 where none does beyond chance."""
+        """Return the largest relative torque error of a point beyond chance; 0 if none."""
         off = np.abs(self.torque - self.best.at(self.speed))
         size = np.abs(self.torque)
         beyond = off > np.maximum(threshold.BEYOND * self.half, threshold.SHARE * size)
         return float(np.max(off[beyond] / np.maximum(size[beyond], 1e-12))) if beyond.any() else 0.0
 
     def curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Signed speeds and torques of a curve through all points, over the speeds measured only.
+        """Return signed speeds and torques of a curve through all points, over the measured speeds
+        only.
 
-        Between two points it goes as the model does.
+        Between two points it follows the model.
         """
         left, speeds, values = self.torque - self.best.at(self.speed), [], []
         for sign in (-1.0, 1.0):
@@ -113,9 +114,9 @@ class SpeedModel:
 
 
 def speed_model(speed: FloatArray, torque: FloatArray, half: FloatArray) -> SpeedModel:
-    """The model of torques [n] at signed speeds [n], ``half`` [n] half their 95 % intervals.
+    """Return the model of torques [n] at signed speeds [n], ``half`` [n] half their 95 % intervals.
 
-    A Stribeck curve is part of it only where the points say so (F test, 99 %).
+    It includes a Stribeck curve only where the points support it (F test, 99 %).
     """
     weight = 1.96 / half
     plain, speeds = _fit(speed, torque, weight, None, 1.0), speed.size // 2

@@ -1,1 +1,1 @@
-"""Frequency response of recordings that other programs made: excitation, estimate, modes, band."""
+"""Frequency response of recordings from other programs: excitation, estimate, modes, band."""

@@ -1,7 +1,8 @@
-"""What a response says of an axis where torque and speed are of one shaft.
+"""Evaluation of a response whose torque and speed belong to the same shaft (collocated).
 
 From a torque to the speed of the same shaft a passive mechanism stays within ±90° at every
-frequency (positive real); a recorded speed that lags more was filtered, or is another shaft's.
+frequency (positive real); a recorded speed that lags more was filtered, or is that of another
+shaft.
 """
 
 from __future__ import annotations
@@ -23,9 +24,10 @@ _CI95 = 1.96
 
 @dataclass(frozen=True)
 class RigidPart:
-    """``inertia`` of the whole axis and ``viscous`` friction in units of the input, with intervals.
+    """``inertia`` of the whole axis with its interval, and ``viscous`` friction, in units of the
+    input.
 
-    The viscous part holds what Coulomb friction amounts to at this level.
+    The viscous part includes the equivalent of Coulomb friction at this level.
     """
 
     inertia: float
@@ -40,11 +42,11 @@ class Contradiction:
     phase_deg: float
     frequency_hz: float
     filter_hz: float | None
-    """A real pole that the fit found in addition to friction: the output may be filtered there."""
+    """A real pole that the fit found in addition to friction: possibly a filter of the output."""
 
 
 def without_filter(found: ForeignResponse, filter_hz: float | None) -> ForeignResponse:
-    """The response without a first-order low-pass of the recorded output."""
+    """Return the response without a first-order low-pass of the recorded output."""
     if filter_hz is None:
         return found
     from dataclasses import replace
@@ -54,10 +56,11 @@ def without_filter(found: ForeignResponse, filter_hz: float | None) -> ForeignRe
 
 
 def path_delay_s(model: ProductModel, filter_hz: float | None) -> float:
-    """Delay between both recorded signals, in seconds; negative where the input is recorded later.
+    """Return the delay between both recorded signals, s; negative where the input is recorded
+    later.
 
-    A fit may put a lead (negative delay) beside a fast real pole whose lag takes it away again:
-    within the lines neither exists, and what is left of both is no more than their difference.
+    A fit may combine a lead (negative delay) with a fast real pole whose lag cancels it: within the
+    lines neither exists, and only their difference is a delay.
     """
     if model.delay_s >= 0.0:
         return model.delay_s
@@ -71,7 +74,7 @@ def path_delay_s(model: ProductModel, filter_hz: float | None) -> float:
 def contradiction(
     found: ForeignResponse, filter_hz: float | None, delay_s: float
 ) -> Contradiction | None:
-    """Whether the lines refute that torque and speed are of one shaft."""
+    """Return where the lines refute that torque and speed belong to one shaft; None if nowhere."""
     bare = without_filter(found, filter_hz)
     f = bare.frequency_hz
     turned = np.degrees(np.angle(bare.response * np.exp(2j * np.pi * f * delay_s)))
@@ -89,7 +92,7 @@ def contradiction(
 
 
 def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | None:
-    """Inertia and friction of the fitted model; nothing where no friction pole is reported."""
+    """Return inertia and friction of the fitted model; None where no friction pole is found."""
     fit = found.fit
     if fit is None:
         return None
@@ -101,22 +104,22 @@ def rigid_part(found: ForeignResponse, filter_hz: float | None) -> RigidPart | N
     pick = np.zeros(fit.covariance.shape[0])
     pick[0] = pick[2 + pole] = 1.0
     for i, sign in _below_the_load(fit.model):
-        # log of (resonance / antiresonance)², which the gain above both has in addition.
+        # Log of (resonance / antiresonance)², by which the gain above both exceeds that below.
         gain *= fit.model.pairs[i].frequency_hz ** (2 * sign)
         pick[2 + len(fit.model.poles_hz) + 2 * i] = 2.0 * sign
     spread = float(np.sqrt(max(float(pick @ fit.covariance @ pick), 0.0)))
-    # What is common to all lines, as the band counts it.
+    # The uncertainty common to all lines, as included in the band.
     common = float(np.median(found.band.level))
     factor = float(np.exp(_CI95 * np.hypot(spread, common)))
     return RigidPart(1.0 / gain, (1.0 / (gain * factor), factor / gain), 1.0 / abs(fit.model.gain))
 
 
 def _below_the_load(model: ProductModel) -> list[tuple[int, int]]:
-    """Pairs (number, 1 or -1) below the first antiresonance that a load can have.
+    """Pairs (index, 1 or -1) below the first antiresonance that a load can have.
 
     From a torque to the speed of the same shaft an antiresonance comes first. A resonance before
-    it, with its antiresonance, is what a fit makes of friction or noise at the lowest lines: the
-    inertia is what shows above both.
+    it, with its antiresonance, is an artefact of friction or noise at the lowest lines: the inertia
+    is the one seen above both.
     """
     order = sorted(range(len(model.pairs)), key=lambda i: model.pairs[i].frequency_hz)
     found: list[tuple[int, int]] = []
@@ -129,23 +132,23 @@ def _below_the_load(model: ProductModel) -> list[tuple[int, int]]:
 
 
 def _filter_pole(model: ProductModel, filter_hz: float | None) -> float | None:
-    """Corner of the real pole that is the stated filter's."""
+    """Corner of the real pole that belongs to the stated filter."""
     if filter_hz is None or len(model.poles_hz) < 2:
         return None
     return min(model.poles_hz, key=lambda corner: abs(float(np.log(corner / filter_hz))))
 
 
 def _friction_pole(model: ProductModel, filter_hz: float | None) -> int | None:
-    """Number of the lowest real pole that is not the filter's."""
+    """Index of the lowest real pole that does not belong to the filter."""
     of_filter = _filter_pole(model, filter_hz)
     rows = [(corner, i) for i, corner in enumerate(model.poles_hz) if corner != of_filter]
     return min(rows)[1] if rows else None
 
 
 def mechanical_model(found: ForeignResponse, filter_hz: float | None) -> MechanicalModel | None:
-    """Sum of a rigid part and modes, from the product of the pairs that are modes.
+    """Return the sum of a rigid part and modes that equals the product of the pairs that are modes.
 
-    Nothing where the pairs do not alternate as those of a collocated response do.
+    None where the pairs do not alternate as those of a collocated response do.
     """
     fit = found.fit
     rigid = rigid_part(found, filter_hz)
@@ -194,7 +197,7 @@ def _root(frequency_hz: float, damping: float) -> complex:
 
 
 def as_frf(found: ForeignResponse, filter_hz: float | None, delay_s: float, rate: float) -> Frf:
-    """The form that designs take: without the output's filter and the delay of the path."""
+    """Return the form that designs use: without the output's filter and the delay of the path."""
     bare = without_filter(found, filter_hz)
     f: FloatArray = bare.frequency_hz
     return Frf(

@@ -1,10 +1,10 @@
-"""What moves an axis between the excited lines: friction, and what friction does not explain.
+"""Motion of an axis between the excited lines: by friction, and what friction does not explain.
 
-On a linear axis nothing but noise lies on the empty bins of a multisine. Coulomb friction puts
-some there, of which its torque by the direction of motion shows how much; what is left is play in
-the mechanics, or friction of another kind (Pintelon & Schoukens, *System Identification*, 2012,
-section 4.4). The two act at other times: friction that is not simply Coulomb's (sticking, a
-bristle's bend) does so where the speed reverses, play where the torque in the coupling does.
+On a linear axis the empty bins of a multisine contain only noise. Coulomb friction causes motion
+there, which is calculated from its torque by the direction of motion; the rest is backlash, or
+friction of another kind (Pintelon & Schoukens, *System Identification*, 2012, section 4.4). The two
+differ in time: friction other than Coulomb's (sticking, bristle deflection) acts where the speed
+reverses, backlash where the torque in the coupling reverses.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ from backend.analysis.thresholds import distortion as threshold
 
 @dataclass(frozen=True)
 class Detected:
-    """Median motion on empty lines between odd ones, relative to that on the lines around.
+    """Median motion on empty lines between odd ones, relative to that on the neighbouring lines.
 
-    What an even or an odd nonlinearity makes of odd lines falls on even or on odd ones (Pintelon &
-    Schoukens, section 4.3). ``even`` and ``odd`` are without the ``noise`` that is left in the mean
-    over the periods, and with friction.
+    Even or odd nonlinearities excited by odd lines cause motion on even or on odd ones (Pintelon &
+    Schoukens, section 4.3). ``even`` and ``odd`` exclude the ``noise`` that is left in the mean
+    over the periods, but include friction.
     """
 
     even: float
@@ -52,11 +52,12 @@ class Detected:
 
 @dataclass(frozen=True)
 class Distortion:
-    """Motion on empty bins relative to that on the lines around; noise is removed.
+    """Motion on empty bins relative to that on the neighbouring lines, without noise.
 
     ``share`` [lines] is what friction does not explain; ``level`` its median in the upper band,
-    ``before`` the same with friction. ``at_reversals`` is how much of it, as torque, falls on
-    reversals of the speed, over their share of the time. All zero where there are no empty bins.
+    ``before`` the same with friction. ``at_reversals`` is the share of its power, as torque, that
+    falls on reversals of the speed, over their share of the time. All zero where there are no empty
+    bins.
     """
 
     share: FloatArray
@@ -67,7 +68,7 @@ class Distortion:
 
     @property
     def play(self) -> bool:
-        """Whether the axis is no linear one, beyond friction: it seems to have play."""
+        """Whether the axis is nonlinear beyond friction, as with backlash."""
         if self.at_reversals > threshold.AT_REVERSALS:
             return False
         left = self.level > threshold.UNEXPLAINED * self.before
@@ -77,14 +78,14 @@ class Distortion:
 def distortion(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, frf: Frf
 ) -> Distortion:
-    """From the recordings and a direct estimate of the velocity with its friction."""
+    """Evaluate the recordings with a direct estimate of the velocity and its friction."""
     none = Distortion(np.zeros(frf.frequency_hz.size))
     e = records[0].excitation
     if e.segments or quantity == "closed_loop":
         return none
     bins = np.arange(e.lines[0], e.lines[-1] + 1)
     empty = np.setdiff1d(bins, np.append(e.lines, e.base_line))
-    # A chirp and a PRBS excite bins that are not evaluated, too.
+    # A chirp and a PRBS also excite bins that are not evaluated.
     played = np.abs(np.fft.rfft(e.one_period))
     empty = empty[played[empty] < threshold.SILENT * np.median(played[e.lines])]
     if empty.size < threshold.FEWEST:
@@ -132,7 +133,7 @@ def distortion(
     upper = f >= threshold.LOWEST * path.sample_rate_hz
     if np.count_nonzero(upper) < threshold.FEWEST:
         return none
-    # Where noise rules, what is left after it is removed is noise.
+    # Where noise dominates, the residual after subtracting it is noise, too.
     highest = f >= threshold.HIGHEST * path.sample_rate_hz
     if not _stands_out(rest, noise, upper, threshold.ABOVE_NOISE):
         if not _stands_out(rest, noise, highest, threshold.FAR_ABOVE_NOISE):
@@ -140,7 +141,7 @@ def distortion(
             return Distortion(quiet, detected=detected)
         upper = highest
     return Distortion(
-        # What lies below the first empty bins is shown by all of them, not by one next to a valley.
+        # Below the first empty bins use the median of all: a single one may lie next to a valley.
         np.asarray(np.interp(frf.frequency_hz, f, share, left=float(np.median(share)))),
         float(np.median(share[upper])),
         float(np.median(plain[upper])),
@@ -152,13 +153,13 @@ def distortion(
 def _detected(
     empty: IntArray, power: FloatArray, noise: FloatArray, around: FloatArray
 ) -> Detected | None:
-    """Of powers [bins]; None where too few bins of either kind are empty."""
+    """Detect from powers [bins]; None where too few bins of either parity are empty."""
     shares = []
     for parity in (0, 1):
         use = empty % 2 == parity
         if np.count_nonzero(use) < threshold.FEWEST:
             return None
-        # Single bins scatter like a power of two degrees of freedom, whose median is no mean.
+        # The power of single bins has two degrees of freedom, so its median is not its mean.
         pure = neighbour_mean(power[use] - noise[use], threshold.REACH) / around[use] ** 2
         shares.append(float(np.sqrt(max(float(np.median(pure)), 0.0))))
     return Detected(shares[0], shares[1], float(np.sqrt(np.median(noise / around**2))))
@@ -167,7 +168,7 @@ def _detected(
 def _stands_out(
     rest: list[FloatArray], noise: list[FloatArray], use: BoolArray, factor: float
 ) -> bool:
-    """Whether what is left on these bins is more than noise."""
+    """Whether the residual on these bins exceeds the noise."""
     if np.count_nonzero(use) < threshold.FEWEST:
         return False
     power, of_noise = (float(np.median(np.mean(p, axis=0)[use])) for p in (rest, noise))
@@ -176,7 +177,7 @@ def _stands_out(
 
 @dataclass(frozen=True)
 class _Seen:
-    """Of one record on the empty bins: without the loop's torque, and without friction as well."""
+    """One record on the empty bins: without the loop's torque, and without friction as well."""
 
     plain: ComplexArray
     left: ComplexArray
@@ -185,11 +186,11 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Way:
-    """To see the motion: by the reported speed, or by the position.
+    """Signal that the motion is read from: reported speed or position.
 
-    A motion shows in both; what only one of them shows is the noise that it has. Behind a coarse
-    encoder the reported speed is noisier by far than the way of a cycle, and a position that is
-    reported in coarse units noisier than the speed.
+    A motion appears in both; what appears in only one of them is noise of that signal. Behind a
+    coarse encoder the reported speed is far noisier than the travel per cycle, and a position that
+    is reported in coarse units noisier than the speed.
     """
 
     late: ComplexArray
@@ -204,7 +205,9 @@ class _Way:
         own: ComplexArray | float,
         friction: ComplexArray,
     ) -> _Seen:
-        """``own`` [periods, bins] is the motion by the loop's own torque, ``friction`` by that."""
+        """Return the spectra; ``own`` [periods, bins]: motion by the loop's torque, ``friction``:
+        motion by friction.
+        """
         if self.placed:
             moved = velocity_from_position(record, between, good, path.sample_rate_hz)
         else:
@@ -213,14 +216,15 @@ class _Way:
         mean = moved.mean(axis=0)
         scatter = np.sum(np.abs(moved - mean) ** 2, axis=0) / (len(good) * (len(good) - 1))
         if self.placed:
-            # A motion that repeats itself repeats the steps of its encoder: that is no scatter.
+            # A periodic motion repeats its quantisation errors, so that they do not appear as
+            # scatter.
             scatter = np.maximum(scatter, _steps(record, between.line_hz))
         left = mean + self.late * friction.mean(axis=0)
         return _Seen(np.asarray(mean), np.asarray(left), np.asarray(scatter))
 
 
 def _steps(record: Record, f: FloatArray) -> FloatArray:
-    """Power [lines] that the steps of the encoder have in a velocity by the position.
+    """Power [lines] of the encoder's quantisation in a velocity derived from the position.
 
     As independent errors of 1/12 of a squared step (Widrow & Kollár, *Quantization Noise*, 2008,
     chapter 4).
@@ -228,7 +232,7 @@ def _steps(record: Record, f: FloatArray) -> FloatArray:
     assert record.position is not None
     e = record.excitation
     places = np.diff(np.unique(record.position))
-    # What is no step is rounding of the numbers.
+    # Smaller differences are rounding of the numbers, not steps of the encoder.
     places = places[places > threshold.ROUNDING * float(np.ptp(record.position))]
     if not places.size:
         return np.zeros(f.size)
@@ -240,13 +244,13 @@ def _steps(record: Record, f: FloatArray) -> FloatArray:
 def _at_reversals(
     record: Record, good: list[int], bins: IntArray, torque: ComplexArray
 ) -> tuple[float, float]:
-    """Shares of the power of a torque on these bins, and of the time, about reversals of speed."""
+    """Shares of a torque's power on these bins, and of the time, near reversals of speed."""
     e = record.excitation
     n = e.period_samples
     speed = np.mean([record.response[e.first_sample + p * n :][:n] for p in good], axis=0)
     reach = 2 * round(threshold.ABOUT_S * e.sample_rate_hz) + 1
     slow = np.abs(speed) < threshold.SLOW * np.std(speed)
-    # The period closes upon itself.
+    # The period is cyclic.
     about = np.convolve(np.pad(slow, reach // 2, mode="wrap"), np.ones(reach), "valid") > 0.5
     spectrum = np.zeros(n // 2 + 1, dtype=np.complex128)
     spectrum[bins] = torque
@@ -255,6 +259,6 @@ def _at_reversals(
 
 
 def _ratio(falls: list[tuple[float, float]]) -> float:
-    """Of power to time, over all records; zero where the speed hardly ever reverses."""
+    """Ratio of power to time, over all records; zero where the speed hardly ever reverses."""
     power, time = np.mean(falls, axis=0)
     return float(power / time) if time > threshold.LEAST_TIME else 0.0

@@ -1,7 +1,7 @@
-"""Which excitation a recorded input holds: a repeated period, a chirp, or noise.
+"""Detects the excitation that a recorded input contains: a repeated period, a chirp, or noise.
 
-A periodic input is the better instrument by far (Pintelon & Schoukens, *System Identification*,
-2012, chapter 2): its periods show noise, and averaging them leaves no leakage.
+A periodic input is by far the best (Pintelon & Schoukens, *System Identification*, 2012,
+chapter 2): its periods show noise, and averaging them leaves no leakage.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ Excited = Literal["periodic", "chirp", "noise"]
 
 @dataclass(frozen=True)
 class ExcitationFound:
-    """``period_samples`` and ``periods`` of a periodic one, which lies in ``stretch`` (samples).
+    """Kind of an excitation; ``period_samples`` and ``periods`` of a periodic one.
 
-    ``repeat_error`` is the share of the input's power that its periods do not have in common.
+    ``stretch`` is its range of samples. ``repeat_error`` is the share of the input's power that its
+    periods do not have in common.
     """
 
     kind: Excited
@@ -33,7 +34,7 @@ class ExcitationFound:
 
 
 def find_excitation(signal: FloatArray) -> ExcitationFound:
-    """Kind of excitation of an input [n] that is not constant."""
+    """Return the kind of excitation of an input [n] that is not constant."""
     whole = slice(0, signal.size)
     for stretch in dict.fromkeys(((whole.start, whole.stop), _loud(signal - np.median(signal)))):
         u = signal[slice(*stretch)]
@@ -65,13 +66,13 @@ def _loud(u: FloatArray) -> tuple[int, int]:
         return 0, u.size
     longest = int(np.argmax(ends - begins))
     first, end = int(begins[longest]), int(ends[longest])
-    # Half of what is looked at together may be silent at an end.
+    # At an end, half of the averaging window may be silent.
     half = width // 2 + 1
     return first + half * (first > 0), end - half * (end < u.size)
 
 
 def _silent_before_or_after(silent: BoolArray) -> BoolArray:
-    """Which are silent with nothing but silence before or behind them."""
+    """True for silence at the start or the end, before or after everything else."""
     loud = np.flatnonzero(~silent)
     outside = np.ones(silent.size, dtype=bool)
     if loud.size:
@@ -80,7 +81,7 @@ def _silent_before_or_after(silent: BoolArray) -> BoolArray:
 
 
 def _passes(u: FloatArray, period: int) -> tuple[int, int]:
-    """First sample and end of the stretch in which every period is followed by the same one."""
+    """First sample and end of the stretch in which every period is followed by an identical one."""
     width = max(period // threshold.OF_PERIOD, 1)
 
     def around(power: FloatArray) -> FloatArray:
@@ -99,14 +100,14 @@ def _passes(u: FloatArray, period: int) -> tuple[int, int]:
         return 0, 0
     longest = int(np.argmax(ends - begins))
     first, end = int(begins[longest]), int(ends[longest]) - 1 + width + period
-    # A part at an end may be silent in half of it.
+    # At an end, half of the averaging window may be silent.
     return first + width * (first > 0), end - width * (end < u.size)
 
 
 def _period(u: FloatArray) -> int:
-    """Shortest whole number of samples after which the input repeats itself; 0 where it does not.
+    """Shortest period of the input in whole samples; 0 where it is not periodic.
 
-    By the normalised correlation of both overlapping parts: 2·Σab/(Σa²+Σb²), 1 where equal.
+    From the normalised correlation of both overlapping parts: 2·Σab/(Σa²+Σb²), 1 where equal.
     """
     n = u.size
     size = 1 << (2 * n - 1).bit_length()
@@ -119,7 +120,7 @@ def _period(u: FloatArray) -> int:
     last = n // threshold.LEAST_PERIODS
     if last <= threshold.LEAST_PERIOD:
         return 0
-    # What is near lag 0 is the smoothness of the signal: the period lies beyond the first fall.
+    # Near lag 0 the correlation shows smoothness only: the period lies beyond the first fall.
     fallen = np.flatnonzero(alike[: last + 1] < 0.5)
     if not fallen.size:
         return 0
@@ -133,7 +134,7 @@ def _period(u: FloatArray) -> int:
     values = alike[first + peaks]
     best = float(np.max(values))
     period = int(first + peaks[np.flatnonzero(values >= best - threshold.AS_GOOD)[0]])
-    # Noise in a recorded input takes as much from every pass; what is alike by chance is so once.
+    # Noise lowers the correlation of every multiple alike; chance similarity occurs only once.
     later = alike[2 * period : n - period + 1 : period]
     again = (
         later.size > 0
@@ -144,9 +145,9 @@ def _period(u: FloatArray) -> int:
 
 
 def _is_chirp(u: FloatArray) -> bool:
-    """One tone at a time whose frequency keeps moving as it does, perhaps to and fro.
+    """Whether there is one tone at a time whose frequency moves steadily, possibly up and down.
 
-    Next to it there may be a slow motion that keeps the axis from sticking.
+    A slow motion that keeps the axis from sticking may be superimposed.
     """
     width = max(u.size // 64, 64)
     _f, _t, parts = scipy.signal.stft(u, nperseg=width, noverlap=width // 2, boundary=None)
@@ -167,9 +168,9 @@ def _is_chirp(u: FloatArray) -> bool:
 
 
 def transient_periods(*spectra: FloatArray) -> int:
-    """How many leading periods are left out, from signals [periods, samples].
+    """Return how many leading periods to leave out, from signals [periods, samples].
 
-    At least one where there are four; two periods at least are kept.
+    At least one if there are four or more; at least two periods are kept.
     """
     count = spectra[0].shape[0]
     worst = 1 if count >= 4 else 0
@@ -184,7 +185,7 @@ def transient_periods(*spectra: FloatArray) -> int:
 
 
 def excited_lines(amplitude: FloatArray, deviation: FloatArray) -> IntArray:
-    """Bins of one period that the input excites, without bin 0 and the highest.
+    """Return the bins of one period that the input excites, without bin 0 and the highest.
 
     ``amplitude`` [bins] of the mean period, ``deviation`` [bins] of that mean. Distortion of a
     measured input lies on the other bins, which a gap in the ordered amplitudes distinguishes.

@@ -1,4 +1,4 @@
-"""From an input and an output that another program recorded to a response with its band. Pure."""
+"""Response with its band from an input and an output recorded by another program."""
 
 from __future__ import annotations
 
@@ -34,7 +34,9 @@ LEAST_SAMPLES = threshold.LEAST_SAMPLES
 
 
 class NoResponse(ValueError):
-    """The recording supports no answer. ``code`` says which rule it breaks, ``facts`` by what."""
+    """Raised if no response can be estimated. ``code`` is the violated rule,
+    ``facts`` its figures.
+    """
 
     def __init__(self, code: str, **facts: float) -> None:
         super().__init__(code)
@@ -46,8 +48,8 @@ class NoResponse(ValueError):
 class ForeignResponse:
     """Response [lines] with ``band``; ``noise``, ``distortion`` relative to the line, one sigma.
 
-    ``excitation`` was found in the input, ``method`` follows from it. ``empty`` is the relative
-    motion on lines that are not excited, even and odd ones, where there are such.
+    ``excitation`` was detected in the input and determines ``method``. ``empty`` is the relative
+    motion on even and on odd lines that are not excited, where there are any.
     """
 
     frequency_hz: FloatArray
@@ -69,12 +71,12 @@ class ForeignResponse:
 
     @property
     def std_db(self) -> FloatArray:
-        """One deviation in dB of what another run shows; 1.96 of it to each side are the band."""
+        """One standard deviation in dB for a repeated run; the band is ±1.96 of it."""
         return np.asarray(20.0 / np.log(10.0) * self.band.real)
 
     @property
     def std_deg(self) -> FloatArray:
-        """The same of the phase in degrees."""
+        """The same for the phase, in degrees."""
         return np.asarray(np.degrees(self.band.imag))
 
     @property
@@ -92,8 +94,8 @@ class ForeignResponse:
 class EmptyLines:
     """Motion on lines that are not excited, relative to the excited lines around it.
 
-    ``number`` [lines] is each one's bin in a period, whose parity tells even from odd distortion;
-    ``power`` [lines] is the squared ratio.
+    ``number`` [lines] is the bin of each in a period, whose parity separates even from odd
+    distortion; ``power`` [lines] is the squared ratio.
     """
 
     frequency_hz: FloatArray
@@ -101,12 +103,12 @@ class EmptyLines:
     power: FloatArray
 
     def within(self, low_hz: float, high_hz: float) -> EmptyLines:
-        """Those between two frequencies."""
+        """Return the lines between two frequencies."""
         use = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
         return EmptyLines(self.frequency_hz[use], self.number[use], self.power[use])
 
     def sizes(self) -> tuple[float | None, float | None]:
-        """Effective value over all even and all odd ones; None where there are too few."""
+        """Return the RMS over all even and all odd lines; None where there are too few."""
         found: list[float | None] = []
         for parity in (0, 1):
             power = self.power[self.number % 2 == parity]
@@ -115,7 +117,9 @@ class EmptyLines:
         return found[0], found[1]
 
     def scatter_at(self, f: FloatArray) -> FloatArray:
-        """One component at the lines ``f``, from the empty ones near each: the larger parity."""
+        """Return the scatter per component at the lines ``f``: that of nearby empty lines of the
+        parity with the larger one.
+        """
         out = np.zeros(f.size)
         for parity in (0, 1):
             use = self.number % 2 == parity
@@ -128,7 +132,7 @@ class EmptyLines:
 
 @dataclass(frozen=True)
 class _Lines:
-    """An estimate before its band: ``noise`` relative, one component."""
+    """An estimate before its band is known: ``noise`` relative, per component."""
 
     frequency_hz: FloatArray
     response: ComplexArray
@@ -147,10 +151,10 @@ def evaluate(
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
 ) -> ForeignResponse:
-    """Response from input to output, both [n], evenly sampled.
+    """Return the response from input to output, both [n], evenly sampled.
 
     Raises:
-        NoResponse: too short, constant, or nothing coherent in it.
+        NoResponse: too short, constant, or not coherent.
     """
     n = signal_in.size
     if n < LEAST_SAMPLES:
@@ -193,11 +197,11 @@ def _cut(lines: _Lines, band_hz: tuple[float, float] | None) -> _Lines:
 
 
 def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Lines:
-    """Mean over the settled periods; noise by how they differ.
+    """Mean over the settled periods; noise from their differences.
 
-    Periods that wander (a position that friction or a disturbance moves on, a speed that drifts)
-    are evaluated once with the slope that all have in common and once each with its own; the
-    evaluation whose periods differ less is kept.
+    Periods that drift (a position moved by friction or a disturbance, a drifting speed) are
+    evaluated once with a slope common to all and once each with its own; the evaluation whose
+    periods differ less is kept.
     """
     count = u.size // period
     both = [x[x.size - count * period :] for x in (u, y)]
@@ -210,7 +214,7 @@ def _by_periods(u: FloatArray, y: FloatArray, rate: float, period: int) -> _Line
 
 
 def _mean_of_periods(rows_u: FloatArray, rows_y: FloatArray, rate: float) -> _Lines:
-    """Of level periods [periods, samples]."""
+    """Estimate from periods [periods, samples] without mean and slope."""
     count, period = rows_u.shape
     dropped = transient_periods(rows_u, rows_y)
     spectra_u, spectra_y = (np.fft.rfft(rows[dropped:], axis=1) for rows in (rows_u, rows_y))
@@ -234,32 +238,32 @@ def _mean_of_periods(rows_u: FloatArray, rows_y: FloatArray, rate: float) -> _Li
 def _alike_periods(error: ComplexArray) -> FloatArray:
     """Factor [lines] on the variance of a mean, from errors [periods, lines] of zero mean.
 
-    What changes slowly from period to period (the samples of a recorder whose clock is not the
-    drive's, warm-up) makes errors that resemble their predecessors, so that the periods count as
-    fewer: (1 + r)/(1 - r) with the correlation r of neighbours (Bayley & Hammersley, 1946).
+    Slow changes from period to period (samples of a recorder whose clock is not the drive's,
+    warm-up) correlate the errors of successive periods, so that the periods count as fewer: (1 +
+    r)/(1 - r) with the correlation r of neighbours (Bayley & Hammersley, 1946).
     """
     count = error.shape[0]
     if count < threshold.FEWEST_ALIKE:
         return np.ones(error.shape[1])
     power = neighbour_mean(np.sum(np.abs(error) ** 2, axis=0), threshold.POOL_EMPTY)
     products = np.sum((error[1:] * error[:-1].conj()).real, axis=0)
-    # Errors without correlation have -1/n about their own mean.
+    # Uncorrelated errors have a correlation of -1/n about their own mean.
     r = neighbour_mean(products, threshold.POOL_EMPTY) / np.maximum(power, 1e-300) + 1.0 / count
     r = np.clip(r, 0.0, 1.0 - 2.0 / (count + 1))
     return np.asarray((1.0 + r) / (1.0 - r))
 
 
 def _common_slope(x: FloatArray, period: int) -> FloatArray:
-    """Change over a period [periods], the same for all: a drift, and not the signal itself."""
+    """Change over a period [periods], the same for all: the drift, without the signal itself."""
     means = x.reshape(-1, period).mean(axis=1)
     return np.full(means.size, np.polyfit(np.arange(means.size), means, 1)[0])
 
 
 def _slope_of_each(x: FloatArray, period: int) -> FloatArray:
-    """Change over each period [periods], by samples a period apart about its beginning.
+    """Change over each period [periods], from samples one period apart around its beginning.
 
-    What repeats itself cancels in their difference; a straight line between both ends keeps the
-    rest from leaking into all lines.
+    The periodic part cancels in their difference; subtracting a straight line between both ends
+    keeps the rest from leaking into all lines.
     """
     apart = x[period:] - x[:-period]
     width = max(period // threshold.ENDS, 1)
@@ -278,7 +282,7 @@ def _level(rows: FloatArray, slopes: FloatArray) -> FloatArray:
 def _on_empty(
     mean_u: ComplexArray, mean_y: ComplexArray, lines: np.ndarray, g: ComplexArray, step_hz: float
 ) -> EmptyLines:
-    """Motion on the empty bins between the lines relative to that on lines around."""
+    """Motion on the empty bins between the lines, relative to that on the neighbouring lines."""
     empty = np.setdiff1d(np.arange(lines[0], lines[-1] + 1), lines)
     near = np.asarray(np.interp(empty, lines, g.real) + 1j * np.interp(empty, lines, g.imag))
     around = np.interp(empty, lines, np.abs(mean_y[lines]))
@@ -323,14 +327,14 @@ def _with_band(lines: _Lines) -> ForeignResponse:
         left = np.asarray(np.log(np.abs(g)) + 1j * np.unwrap(np.angle(g)))
     scatter = line_scatter(left, lines.noise)
     if lines.empty is not None:
-        # What lies on the empty lines lies on the excited ones near them, too.
+        # Distortion on the empty lines is also present on the excited lines near them.
         scatter = np.maximum(scatter, lines.empty.scatter_at(f))
     band = repeat_band(f, scatter, fit.model if fit is not None else None, modes)
     if not lines.independent:
         band = _with_feedback(band, lines.coherence)
     coherence = lines.coherence
     if lines.independent:
-        # What one run's line is made of: the linear part against noise and distortion.
+        # Composition of a line in one run: the linear part against noise and distortion.
         coherence = 1.0 / (1.0 + 2.0 * scatter**2)
     return ForeignResponse(
         f, g, np.asarray(coherence), lines.noise,
@@ -341,10 +345,10 @@ def _with_band(lines: _Lines) -> ForeignResponse:
 
 
 def _with_feedback(band: RepeatBand, coherence: FloatArray) -> RepeatBand:
-    """With what a controller may have put into an input that does not repeat itself.
+    """Band widened by a possible feedback of the output's noise into a non-periodic input.
 
-    Where the input holds the answer to the output's noise v, cross spectra give G·(1 - T·x) with
-    the closed loop's T and the share x of noise to caused output (Söderström & Stoica, *System
+    Where the input contains the response to the output's noise v, cross spectra give G·(1 - T·x)
+    with the closed loop's T and the ratio x of noise to caused output (Söderström & Stoica, *System
     Identification*, 1989, section 10.3). One record does not show whether a loop was closed.
     """
     seen = neighbour_mean(coherence, threshold.POOL_EMPTY)
@@ -374,7 +378,7 @@ def _fitted(lines: _Lines) -> ProductFit | None:
 
 
 def _band_hz(f: FloatArray, coherence: FloatArray) -> tuple[float, float]:
-    """From the first to the last coherent line."""
+    """First and last coherent line, Hz."""
     good = np.flatnonzero(coherence > threshold.COHERENT)
     if good.size < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(coherence)))
@@ -382,7 +386,7 @@ def _band_hz(f: FloatArray, coherence: FloatArray) -> tuple[float, float]:
 
 
 def _clipped(u: FloatArray) -> float:
-    """Share of samples at the very highest or lowest value of the input."""
+    """Share of samples at the highest or lowest value of the input."""
     low, high = float(np.min(u)), float(np.max(u))
     near = 1e-6 * (high - low)
     return float(np.mean((u >= high - near) | (u <= low + near)))

@@ -38,8 +38,8 @@ __all__ = ["Frf", "Quantity", "Record", "estimate_periodic", "valid_band_hz"]
 class Frf:
     """A measured response, line by line.
 
-    ``response`` [n] complex; ``std_db``, ``std_deg`` one standard deviation such that ±1.96 of
-    it covers 95 %; NaN where a single period allows no statement. ``noise`` and ``distortion``
+    ``response`` [n] complex; ``std_db``, ``std_deg`` one standard deviation, of which ±1.96
+    cover 95 %; NaN where a single period permits no estimate. ``noise`` and ``distortion``
     are amplitudes per line in units of the response signal. ``coulomb_nm`` is the friction whose
     torque was subtracted.
     """
@@ -57,9 +57,9 @@ class Frf:
     periods_dropped: int
     coulomb_nm: float = 0.0
     scatter_left: float = 1.0
-    """Share of what the realisations differ by that is left without that friction."""
+    """Share of the scatter between realisations that is left after subtracting that friction."""
     friction: ComplexArray | None = None
-    """By how much the logarithm of each line may be off, all together, by friction; or nothing."""
+    """Possible common error of the logarithm of all lines by friction; None where there is none."""
 
     @property
     def magnitude_db(self) -> FloatArray:
@@ -73,12 +73,12 @@ class Frf:
 
     @property
     def in_band(self) -> BoolArray:
-        """Lines inside the valid band."""
+        """True for lines inside the valid band."""
         low, high = self.valid_band_hz
         return np.asarray((self.frequency_hz >= low) & (self.frequency_hz <= high))
 
     def cut(self, highest_hz: float) -> Frf:
-        """Without the lines above a frequency."""
+        """Return the response without the lines above a frequency."""
         use = self.frequency_hz <= highest_hz
         lines = {
             f.name: getattr(self, f.name)[use]
@@ -91,7 +91,8 @@ class Frf:
 def valid_band_hz(
     lowest_hz: float, sample_rate_hz: float, *, model: bool = False, jitter_s: float = 0.0
 ) -> tuple[float, float]:
-    """Band in which an answer holds; an upper end below the lower one means "refuse".
+    """Return the band in which the estimate is valid; an upper end below the lower one means
+    "refuse".
 
     Sampling-time jitter of standard deviation s turns the phase by 2π·f·s; 0.05 rad of it (3°)
     is the limit on polled links.
@@ -112,13 +113,13 @@ def estimate_periodic(
     coulomb_nm: float | None = 0.0,
     position: bool = False,
 ) -> Frf:
-    """Period-synchronous estimate over all realisations and periods.
+    """Return the period-synchronous estimate over all realisations and periods.
 
-    With ``position`` the velocity is calculated from the records' position: no speed filter lies in
-    the way, images arrive weaker, and the noise is that of the encoder.
+    With ``position`` the velocity is derived from the records' position: it passes no speed filter,
+    its images are weaker, and its noise is that of the encoder.
 
     ``coulomb_nm`` is friction whose torque is subtracted (units of the torque; the response must
-    then be a velocity, of a closed loop the speed loop's); None estimates it from the data.
+    then be a velocity, for a closed loop that of the speed loop); None estimates it from the data.
 
     Scatter between periods is noise; scatter between realisations beyond that is nonlinear
     distortion (Pintelon & Schoukens section 4.3, "robust method"). Variances are pooled over
@@ -129,11 +130,11 @@ def estimate_periodic(
         coulomb_nm = estimate_coulomb(s, path, quantity)
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
-    # What friction did to the answer is known in part only; that is charged to the band (more of
-    # it would also weigh lines less that show the speed filter well).
+    # The effect of friction on the response is known only in part; that part is added to the band
+    # (a larger one would give less weight to the lines that show the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
     reported = all(record.known_direction is not None for record in records)
-    # Where friction takes most of the torque, a share of it is much of what is left.
+    # Where friction takes most of the torque, a share of it is large relative to the rest.
     uncertainty = (
         threshold.BY_BALANCE * (g / plain - 1.0)
         if reported
@@ -141,7 +142,8 @@ def estimate_periodic(
     )
     size, turn = np.abs(uncertainty.real), np.abs(uncertainty.imag)
     if reported:
-        # What the balance leaves is no share of what friction did: it may turn a line as well.
+        # The error of the torque balance is not a share of the friction effect: it may also turn
+        # a line.
         size = turn = threshold.EACH_BY_BALANCE * np.abs(g / plain - 1.0)
     power = np.asarray(sum(np.abs(r.mean(axis=0)) ** 2 for r in s.sent))
     noise_var, total_var, freedom = _variances(s, inputs, g, smooth_lines)
@@ -191,7 +193,8 @@ def _variances(
         noise = neighbour_mean(np.asarray(inner) / noise_freedom, reach)
     width = min(2 * reach + 1, g.size)
     if count > 1:
-        # A pair of opposite sign shares its phases and so its odd distortion: it is one draw.
+        # A pair of opposite sign has the same phases and so the same odd distortion: it is one
+        # draw.
         aligned = np.array(
             [m * r.mean(axis=0).conj() for m, r in zip(means, s.sent, strict=True)]
         ) / np.maximum([np.abs(r.mean(axis=0)) for r in s.sent], 1e-300)
@@ -200,7 +203,7 @@ def _variances(
         rows = names if np.unique(names).size > 1 else draws
         groups = np.array([aligned[rows == d].mean(axis=0) for d in draws])
         scatter = np.sum(np.abs(groups) ** 2, axis=0) / (len(draws) - 1) * (count / len(draws))
-        # Few draws can look quieter than the noise between periods says they are.
+        # With few draws the scatter may be below the noise between periods by chance.
         total = np.fmax(neighbour_mean(scatter, reach), noise * count / s.used)
         return noise, total, 2 * (len(draws) - 1) * width
     return noise, noise * count / s.used, 2 * noise_freedom * width

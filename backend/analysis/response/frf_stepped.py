@@ -18,7 +18,7 @@ from backend.analysis.signals.line_spectra import (
 
 
 def estimate_stepped(record: Record, path: SignalPath, quantity: Quantity) -> Frf:
-    """One complex amplitude per tone of a stepped sine; the halves of a tone give the spread.
+    """Estimate one complex amplitude per tone of a stepped sine; the two halves give its deviation.
 
     Raises:
         ValueError: the excitation has no tones.

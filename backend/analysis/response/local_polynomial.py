@@ -2,7 +2,7 @@
 
 Around each frequency response and leakage are smooth, the excitation is not (Pintelon &
 Schoukens, *System Identification*, 2012, section 7.2): Y(k+r) = G(k+r)·U(k+r) + T(k+r) + V(k+r)
-with polynomials G and T in r, by least squares.
+with polynomials G and T in r, fitted by least squares.
 """
 
 from __future__ import annotations
@@ -15,15 +15,16 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, IntArray
 from backend.analysis.thresholds import local_polynomial as threshold
 
 _ORDER = 2
-#: Unknowns of a window: both polynomials. So many equations more show the scatter.
+#: Unknowns of a window: the coefficients of both polynomials. Further equations show the scatter.
 _UNKNOWNS = 2 * (_ORDER + 1)
 
 
 @dataclass(frozen=True)
 class LocalEstimate:
-    """``response`` [lines], its variance (of the complex number) and the coherence without leakage.
+    """``response`` [lines], its variance (of the complex number), and the coherence without
+    leakage.
 
-    Source of the variance: residual power of the window times (XᴴX)⁻¹ of the response.
+    The variance is the residual power of the window times (XᴴX)⁻¹ of the response.
     """
 
     response: ComplexArray
@@ -34,7 +35,7 @@ class LocalEstimate:
 def local_polynomial(
     input_spectrum: ComplexArray, output_spectrum: ComplexArray, centres: IntArray, reach: int
 ) -> LocalEstimate:
-    """Estimate at the bins ``centres`` from ``reach`` bins to each side."""
+    """Estimate at the bins ``centres`` from ``reach`` bins on each side."""
     least = (_UNKNOWNS + threshold.SPARE) // 2
     reach = max(reach, least)
     bins = input_spectrum.size
@@ -63,9 +64,8 @@ def local_polynomial(
 
 
 def smooth_residual(values: ComplexArray, reach: int) -> tuple[ComplexArray, FloatArray]:
-    """What each value [lines] differs by from a local parabola through ``reach`` neighbours a side.
-
-    Also returns the share of a scatter's variance that such a difference keeps.
+    """Return the residual of each value [lines] from a local parabola through ``reach`` neighbours
+    on each side, and the share of the scatter's variance that this residual keeps.
     """
     n = values.size
     reach = min(reach, max((n - 1) // 2, 1))

@@ -1,4 +1,4 @@
-"""Resonances and antiresonances that a fitted response shows, with intervals."""
+"""Resonances and antiresonances of a fitted response, with intervals."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _CI95 = 1.96
 
 @dataclass(frozen=True)
 class FoundMode:
-    """``pair`` is its number in the model; ``row`` what is reported about it."""
+    """``pair`` is the index of the pair in the model; ``row`` its row of the resonance table."""
 
     pair: int
     row: Resonance
 
 
 def modes_of(fit: ProductFit, f: FloatArray) -> tuple[FoundMode, ...]:
-    """Modes ascending; only those that are a peak or a valley of the curve inside the lines."""
+    """Return the modes that are a peak or a valley of the curve inside the lines, ascending."""
     model = fit.model
     dense = np.geomspace(f[0], f[-1], 4000)
     db = 20.0 * np.log10(np.maximum(np.abs(model.response(dense)), 1e-300))

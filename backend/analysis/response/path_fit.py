@@ -1,7 +1,7 @@
 """Hold, delay and current loop between the sent setpoints and the torque, from the recording.
 
-The sampled torque is what the setpoints cause by a short difference equation, and next to a
-closed loop what that makes of the sampled speed. Both are fitted together, line by line.
+The sampled torque follows the setpoints by a short difference equation, and with a closed loop also
+the sampled speed by its controller. Both are fitted together over the lines.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record, mean_spectra
 from backend.analysis.thresholds import path_fit as threshold
 
-#: Ordinary current loops, in Hz: log of the middle.
+#: Centre of the prior for the log corner of current loops, Hz.
 _USUAL_CORNER = float(np.log(1000.0))
 _SLOWEST, _FASTEST = float(np.log(80.0)), float(np.log(6000.0))
 _CORNERS_HZ = np.geomspace(200.0, 5000.0, 6)
@@ -40,14 +40,14 @@ def find_paths(
     motion: SampledFit | None = None,
     controller: LoopModel | None = None,
 ) -> tuple[SignalPath, ...]:
-    """The paths that explain the reported torque, best first; one for each hold that may be.
+    """Return the paths that explain the reported torque, best first; at least one for each possible
+    hold that fits equally well.
 
-    ``path`` shows what is known: its hold (``hold_known``), its current loop unless None; its
-    delay is only used where no torque was recorded. Interpolation is recognised by the torque
-    alone where the current loop is known or slow; else the mechanics' fit must show. ``motion``
-    is such a fit with a path found before: it shows how the samples of a closed loop's own torque
-    and of the speed differ from what they are samples of. ``controller`` is the closed loop's,
-    where it is known.
+    ``path`` states what is known: its hold (``hold_known``), its current loop unless None; its
+    delay is used only where no torque was recorded. The torque alone identifies interpolation only
+    where the current loop is known or slow; otherwise the fit of the mechanics must. ``motion`` is
+    such a fit with a path found before: it corrects for the images in the sampled torque of a
+    closed loop and in the speed. ``controller`` is that of the closed loop, where it is known.
 
     Raises:
         ValueError: every period has a gap.
@@ -67,11 +67,11 @@ def path_covariance(
     motion: SampledFit | None = None,
     controller: LoopModel | None = None,
 ) -> FloatArray:
-    """How exactly the torque shows a path that it was found with: cycles and log of the corner.
+    """Return how exactly the torque determines a path: cycles of delay and log of the corner.
 
-    Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is as unusual as
-    drives are: those in step with the bus take setpoints at its cycles, and a corner that a
-    drive reports is meant to be one of first order. ``controller`` is the closed loop's, where it
+    Covariance [2, 2], or [1, 1] without a corner. What the torque leaves open is limited by a
+    prior: drives in step with the bus take setpoints at its cycles, and a corner that a drive
+    reports is meant to be one of first order. ``controller`` is that of the closed loop, where it
     is known.
     """
     usual = [threshold.STEADY if at_whole_cycles(path) else threshold.UNSTEADY]
@@ -89,7 +89,7 @@ def path_covariance(
 
 
 def torque_left(records: tuple[Record, ...], path: SignalPath) -> float:
-    """Share of the reported torque that a path does not explain, without a loop (RMS)."""
+    """Return the share (RMS) of the reported torque that a path leaves unexplained, no loop."""
     fit = PathFit.of(records, path, False, None)
     rest = fit.rest(path)
     whole = fit.torque * fit.weight
@@ -97,7 +97,7 @@ def torque_left(records: tuple[Record, ...], path: SignalPath) -> float:
 
 
 def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath:
-    """A path with another delay, and with another corner where there is one."""
+    """Return a path with another delay, and with another corner where there is one."""
     corner = path.current_bandwidth_hz
     late_s = command_delay_s(cycles_of(path) + cycles, path.hold, path.sample_rate_hz)
     if corner is not None:
@@ -106,17 +106,17 @@ def moved_path(path: SignalPath, cycles: float, log_corner: float) -> SignalPath
 
 
 def path_between(one: SignalPath, other: SignalPath) -> FloatArray:
-    """What `moved_path` takes from one path to the other: cycles, and logarithm of the corner."""
+    """Return the step of `moved_path` from one path to the other: cycles, and log of the corner."""
     cycles = (other.command_delay_s - one.command_delay_s) * one.sample_rate_hz
     corners = (other.current_bandwidth_hz or 1.0) / (one.current_bandwidth_hz or 1.0)
     return np.array([cycles, float(np.log(corners))])
 
 
 def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
-    """The best path of each hold as far as they explain alike, those of whole cycles first.
+    """Return the best path of each hold that fits equally well, those of whole cycles first.
 
-    Noise and the samples of a stiff loop's torque make a fraction of a cycle look better than the
-    truth; so of every hold its best whole cycles stand for trial, too.
+    Noise and the samples of a stiff loop's torque can make a fraction of a cycle fit better than
+    the truth; therefore the best whole number of cycles of every hold is a candidate as well.
     """
     found = sorted((fit.best(hold) for hold in holds), key=lambda t: t[1])
     least = max(found[0][1], threshold.ROUNDING)
@@ -133,14 +133,14 @@ def ranked(fit: PathFit, holds: tuple[Hold, ...]) -> tuple[SignalPath, ...]:
 
 
 def at_whole_cycles(path: SignalPath) -> bool:
-    """Whether setpoints take effect with a cycle of the bus, as drives in step with it do."""
+    """Whether setpoints take effect at whole cycles of the bus, as with drives in step with it."""
     cycles = cycles_of(path)
     return abs(cycles - round(cycles)) < threshold.WHOLE
 
 
 @dataclass(frozen=True)
 class PathFit:
-    """Torque and speed per unit of what was sent, [lines]."""
+    """Fit of a path to torque and speed per unit of the sent signal, [lines]."""
 
     f: FloatArray
     torque: ComplexArray
@@ -149,7 +149,7 @@ class PathFit:
     path: SignalPath
     loop_closed: bool
     controller: LoopModel | None = None
-    """Of the closed loop, where it is known."""
+    """Controller of the closed loop, where it is known."""
 
     @staticmethod
     def of(
@@ -159,7 +159,7 @@ class PathFit:
         motion: SampledFit | None,
         controller: LoopModel | None = None,
     ) -> PathFit:
-        """From recordings, as `find_paths` has them."""
+        """Return the problem for recordings, with arguments as for `find_paths`."""
         f, sent, torque, velocity = mean_spectra(records)
         size = np.sqrt(np.abs(sent) / np.sum(np.abs(sent)))
         if loop_closed and motion is None:
@@ -169,8 +169,8 @@ class PathFit:
         return PathFit(f, torque / sent, velocity / sent, size, path, loop_closed, controller)
 
     def best(self, hold: Hold) -> tuple[SignalPath, float]:
-        """The best delay and corner with this hold, and what they leave unexplained."""
-        # A sample just behind a step shows most of the delay, and only if a start is near.
+        """Return the best delay and corner with this hold, and the unexplained residual."""
+        # Most of the delay shows in the samples just behind a step, and only from a nearby start.
         cycles = np.sort(
             [
                 n + part
@@ -192,7 +192,7 @@ class PathFit:
         return self._path_of(x, hold), cost
 
     def best_whole(self, hold: Hold) -> tuple[SignalPath, float]:
-        """The best delay of whole cycles with this hold, and what it leaves unexplained."""
+        """Return the best whole number of cycles with this hold, and the unexplained residual."""
         tried = []
         for late in np.arange(0.0, threshold.MOST_CYCLES):
             corners = _CORNERS_HZ if self.path.current_bandwidth_hz is None else [None]
@@ -216,28 +216,28 @@ class PathFit:
         scale = np.array([0.05, 0.1])[: x0.size]
 
         def rows(x: FloatArray) -> FloatArray:
-            # The solver takes small numbers for zero.
+            # The solver treats very small numbers as zero.
             return self._rows(x, hold) * threshold.SCALE
 
         end = scipy.optimize.least_squares(rows, x0, bounds=(low, high), x_scale=scale, max_nfev=30)
         return end.x, 2.0 * float(end.cost) / threshold.SCALE**2
 
     def _path_of(self, x: FloatArray, hold: Hold) -> SignalPath:
-        """Parameters are cycles of delay and, where it is not known, the log of the corner."""
+        """Path of the parameters: cycles of delay, and log of the corner if it is not known."""
         late_s = command_delay_s(float(x[0]), hold, self.path.sample_rate_hz)
         known = self.path.current_bandwidth_hz
         corner = float(np.exp(x[1])) if known is None else known
         return replace(self.path, hold=hold, command_delay_s=late_s, current_bandwidth_hz=corner)
 
     def _rows(self, x: FloatArray, hold: Hold) -> FloatArray:
-        """What is left unexplained, and how unusual the path is."""
+        """Residuals of the fit, and deviations of the path from the prior."""
         usual = [threshold.WHOLE_CYCLES * np.sin(np.pi * x[0]) / np.pi]
         if x.size == 2:
             usual.append(threshold.ORDINARY * (x[1] - _USUAL_CORNER))
         return np.concatenate([self.rest(self._path_of(x, hold)), usual])
 
     def rest(self, path: SignalPath) -> FloatArray:
-        """What the path leaves unexplained, real and imaginary parts."""
+        """Return what the path leaves unexplained, as real and imaginary parts."""
         error = self.torque - sampled_command_response(self.f, path)
         if self.controller is not None:
             error = error + self.answered(path) * self.controller.response(self.f)
@@ -254,6 +254,6 @@ class PathFit:
         return np.asarray(target - q @ (q.T @ target))
 
     def answered(self, path: SignalPath) -> ComplexArray:
-        """The speed as it comes back as torque, per unit of gain [lines]."""
+        """Return the torque that the loop makes of the speed, per unit of gain [lines]."""
         own = self.velocity * lag_response(self.f, path.current_bandwidth_hz)
         return np.asarray(own * delay_response(self.f, path.loop_delay_s))

@@ -1,8 +1,8 @@
 """A response as gain, delay, real poles and pairs of poles and zeros: for motor and load side.
 
 Unlike `mechanical_model` it assumes neither that the response is collocated nor that it is a speed:
-a recording of others may be filtered, or of the load. Found greedily, refined together by least
-squares on the logarithm, in which every line counts by its relative scatter.
+a recording from another program may be filtered, or of the load. Terms are added greedily and
+refined together by least squares on the logarithm, weighted by the relative scatter of each line.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Pair:
     damping: float
 
     def factor(self, f: FloatArray) -> ComplexArray:
-        """(1 - x² + 2jζx) with x = f/f₀; inverted for poles."""
+        """Return (1 - x² + 2jζx) with x = f/f₀; inverted for poles."""
         x = f / self.frequency_hz
         value = 1.0 - x * x + 2j * self.damping * x
         return np.asarray(value if self.kind == "antiresonance" else 1.0 / value)
@@ -35,7 +35,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class ProductModel:
-    """``gain`` with its sign; ``poles_hz`` corners of real poles; ``delay_s``."""
+    """``gain`` with its sign; ``poles_hz`` corners of real poles; ``delay_s`` in s."""
 
     gain: float
     delay_s: float
@@ -43,7 +43,7 @@ class ProductModel:
     pairs: tuple[Pair, ...] = ()
 
     def response(self, f: FloatArray) -> ComplexArray:
-        """Complex response at frequencies in Hz."""
+        """Return the complex response at frequencies in Hz."""
         out = self.gain * np.exp(-2j * np.pi * f * self.delay_s)
         for corner in self.poles_hz:
             out = out / (1.0 + 1j * f / corner)
@@ -54,7 +54,7 @@ class ProductModel:
 
 @dataclass(frozen=True)
 class ProductFit:
-    """``covariance`` of `vector_of` the model; ``scatter`` of the residuals, one component."""
+    """A fit: ``covariance`` of the parameters (`vector_of`), ``scatter`` per component."""
 
     model: ProductModel
     covariance: FloatArray
@@ -63,14 +63,14 @@ class ProductFit:
 
 
 def vector_of(model: ProductModel) -> FloatArray:
-    """log|gain|, delay in ms, log corners, then log frequency and log damping of each pair."""
+    """Return log|gain|, delay in ms, log corners, then log frequency and damping per pair."""
     head = [np.log(abs(model.gain)), model.delay_s * 1e3, *np.log(model.poles_hz)]
     pairs = [v for p in model.pairs for v in (np.log(p.frequency_hz), np.log(p.damping))]
     return np.asarray([*head, *pairs], dtype=np.float64)
 
 
 def model_of(x: FloatArray, like: ProductModel) -> ProductModel:
-    """Backwards, with the structure and sign of another model."""
+    """Return the model of a parameter vector, with structure and sign of another model."""
     real = len(like.poles_hz)
     rest = x[2 + real :]
     pairs = tuple(
@@ -86,14 +86,14 @@ def model_of(x: FloatArray, like: ProductModel) -> ProductModel:
 
 
 def log_ratio(response: ComplexArray, model: ProductModel, f: FloatArray) -> ComplexArray:
-    """Logarithm of response over model, phase within a half turn."""
+    """Return the logarithm of response over model, with the phase within a half turn."""
     return np.asarray(np.log(response / model.response(f)))
 
 
 def fit_product(f: FloatArray, response: ComplexArray, weight: FloatArray) -> ProductFit | None:
-    """The simplest product that the lines do not ask more of; nothing below eight lines.
+    """Return the simplest product that explains the lines; None below eight lines.
 
-    ``weight`` [lines] counts like 1/σ of the logarithm, relative.
+    ``weight`` [lines] is proportional to 1/σ of the logarithm.
     """
     if f.size < 8:
         return None
@@ -112,19 +112,19 @@ def fit_product(f: FloatArray, response: ComplexArray, weight: FloatArray) -> Pr
 
 
 def _alike(left: ComplexArray) -> float:
-    """Correlation of neighbours."""
+    """Correlation of neighbouring lines."""
     near = float(np.vdot(left[:-1], left[1:]).real)
     return near / max(float(np.sum(np.abs(left) ** 2)), 1e-300)
 
 
 def _cost(model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatArray) -> float:
-    """Robust: lines in a deep valley, drowned in noise, decide nothing."""
+    """Robust cost: lines in a deep valley that are mostly noise have little influence."""
     z = np.abs(w * log_ratio(response, model, f))
     return float(np.sum(2.0 * (np.sqrt(1.0 + (z / 0.3) ** 2) - 1.0)))
 
 
 def _start(f: FloatArray, response: ComplexArray, w: FloatArray) -> ProductModel:
-    """Gain, delay and up to three real poles; more only where they are worth it."""
+    """Gain, delay and up to three real poles, each only where it reduces the cost enough."""
     rows = []
     for real in range(threshold.MOST_REAL + 1):
         corners = tuple(f[0] * 0.3 * 4.0**i for i in range(real))
@@ -142,7 +142,7 @@ def _start(f: FloatArray, response: ComplexArray, w: FloatArray) -> ProductModel
 def _with_real(
     model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatArray
 ) -> ProductModel:
-    """Real poles that show only now that a mode is explained."""
+    """Add real poles that become visible only once a mode is explained."""
     best = model
     while len(best.poles_hz) < threshold.MOST_REAL:
         tried = [
@@ -187,7 +187,7 @@ def _with_pair(
     single = [row for row in tried if len(row[1]) == 1][:3]
     for _, pairs in [*tried[:2], *single[:2]]:
         found = _refined(replace(model, pairs=(*model.pairs, *pairs)), f, response, w)
-        # A pair alone is simpler than two.
+        # A single resonance or antiresonance is preferred to two.
         price = threshold.WORTH ** len(pairs)
         if best is None or _cost(found, f, response, w) / price < _cost(best, f, response, w) / (
             threshold.WORTH ** (len(best.pairs) - len(model.pairs))
@@ -197,7 +197,7 @@ def _with_pair(
 
 
 def _left(left: ComplexArray, w: FloatArray) -> float:
-    """Cost of a logarithm without its mean, phases within a half turn."""
+    """Cost of a logarithm without its mean, with phases within a half turn."""
     turned = left - np.sum(w * left.real) / np.sum(w)
     imag = (turned.imag + np.pi) % TURN - np.pi
     z = w * np.hypot(turned.real, imag)
@@ -246,7 +246,7 @@ def _refined(
 
 
 def jacobian(model: ProductModel, f: FloatArray) -> ComplexArray:
-    """Change of the logarithm [lines, parameters] with `vector_of`."""
+    """Return the derivatives of the logarithm [lines, parameters] by `vector_of`."""
     columns = [np.ones(f.size, dtype=np.complex128), -2e-3j * np.pi * f]
     for corner in model.poles_hz:
         turned = 1j * f / corner
@@ -263,7 +263,7 @@ def jacobian(model: ProductModel, f: FloatArray) -> ComplexArray:
 def _described(
     model: ProductModel, f: FloatArray, response: ComplexArray, w: FloatArray
 ) -> ProductFit:
-    """Covariance by Gauss and Newton; residuals that neighbours share count as fewer lines."""
+    """Gauss-Newton covariance; correlated residuals of neighbours count as fewer lines."""
     left = log_ratio(response, model, f)
     slopes = w[:, None] * jacobian(model, f)
     stacked = np.vstack([slopes.real, slopes.imag])

@@ -1,8 +1,8 @@
-"""What torque a speed loop makes of its reference, read from a recording.
+"""Torque that a speed loop makes of its reference, identified from a recording.
 
-The loop makes its torque of the reference less the speed, both by K·(1 + a/s), and K and K·a are
-the only two numbers that all lines share: with hold, delay and current loop tried as for a path
-they are two columns of least squares.
+The loop makes its torque of the reference minus the speed, both by K·(1 + a/s). K and K·a are
+the only two numbers common to all lines: with hold, delay and current loop tried as for a path
+they are the coefficients of two columns in a least-squares problem.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class ReferenceLoop:
     path: SignalPath
 
     def alike(self, other: ReferenceLoop) -> bool:
-        """Whether mechanics that are found with the other one would be the same."""
+        """Return whether mechanics identified with the other one would be the same."""
         corners = (p.current_bandwidth_hz or np.inf for p in (self.path, other.path))
         first, second = (1.0 / corner for corner in corners)
         gain = abs(other.controller.c0 / self.controller.c0 - 1.0)
@@ -51,11 +51,11 @@ def reference_gain(
     hold_known: bool,
     motion: SampledFit | None = None,
 ) -> ReferenceLoop:
-    """Controller and path that explain the recorded torque.
+    """Return controller and path that explain the recorded torque.
 
-    ``records`` have the reference as what was sent, in the unit of the response.
-    ``integral_rad_s`` is the corner a of the integral; None: the recording shows. ``motion`` is
-    a fit of the mechanics as in `find_paths`: a light axis' own speed is sampled, too.
+    ``records`` have the reference as the sent signal, in the unit of the response.
+    ``integral_rad_s`` is the corner a of the integral; None: it is fitted. ``motion`` is
+    a fit of the mechanics as in `find_paths`, needed as the speed of a light axis is aliased, too.
 
     Raises:
         ValueError: every period has a gap, or the torque does not follow the reference.
@@ -77,7 +77,7 @@ def reference_gain(
 
 @dataclass(frozen=True)
 class _ByReference(PathFit):
-    """The reference is what was sent; ``integral_rad_s`` is its integral's corner where known."""
+    """The sent signal is the reference; ``integral_rad_s`` is its integral's corner where known."""
 
     integral_rad_s: float | None = None
 
@@ -85,21 +85,21 @@ class _ByReference(PathFit):
     def read(
         records: tuple[Record, ...], path: SignalPath, motion: SampledFit | None
     ) -> _ByReference:
-        """The same spectra as for a path."""
+        """Return the problem with the same spectra as for a path."""
         fit = PathFit.of(records, path, True, motion)
         return _ByReference(fit.f, fit.torque, fit.velocity, fit.weight, path, True)
 
     def rest(self, path: SignalPath) -> FloatArray:
-        """What neither gain nor integral explain of the torque, real and imaginary parts."""
+        """Return the torque that neither gain nor integral explain, as real and imaginary parts."""
         return np.asarray(self._target() - self._table(path) @ self.gains(path))
 
     def gains(self, path: SignalPath) -> FloatArray:
-        """K, and K·a unless a is known."""
+        """Return K, and K·a unless a is known."""
         found, *_ = np.linalg.lstsq(self._table(path), self._target(), rcond=None)
         return np.asarray(found)
 
     def corner_rad_s(self, path: SignalPath) -> float:
-        """The integral's corner a."""
+        """Return the integral's corner a."""
         if self.integral_rad_s is not None:
             return self.integral_rad_s
         gain, integral = self.gains(path)

@@ -1,9 +1,9 @@
-"""How a closed loop's reference reached it: hold and delay, tested on the measured loop itself.
+"""Hold and delay of a closed loop's reference, tested on the measured loop itself.
 
-A closed loop T is the measured response over what hold and delay make of the reference. Where the
-open loop is large T is 1 whatever the plant is, so that a phase left there is the reference's and
-none of the loop's; an error of the plant shows in T by its sensitivity S = 1 - T. Delay of the
-reference, size and delay of the loop are therefore distinguished by least squares, for each hold.
+A closed loop T is the measured response divided by hold and delay of the reference. Where the
+open loop is large T is 1 whatever the plant is, so that a phase left there belongs to the reference
+and not to the loop; an error of the plant appears in T multiplied by the sensitivity S = 1 - T.
+Delay of the reference, gain and delay of the loop are thus separable by least squares, per hold.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from backend.analysis.thresholds import reference_path as threshold
 
 @dataclass(frozen=True)
 class ReferencePath:
-    """One hold with what makes the measured loop most like the predicted one.
+    """One hold with the parameters that make the measured loop most like the predicted one.
 
-    ``late_s`` is the reference's delay beyond the assumed one with its deviation; ``misfit`` the
-    root mean square of what is left, in deviations.
+    ``late_s`` is the reference's delay beyond the assumed one, ``late_std_s`` its deviation;
+    ``misfit`` the root mean square of the residuals, in deviations.
     """
 
     hold: Hold
@@ -31,17 +31,17 @@ class ReferencePath:
     late_std_s: float
     misfit: float
     closed: ComplexArray
-    """The closed loop with this hold and, where it is sure, this delay removed."""
+    """The closed loop with this hold and, where it is significant, this delay removed."""
     loop_late_s: tuple[float, float] = (0.0, threshold.LOOP_LATE_S)
     loop_size: tuple[float, float] = (0.0, threshold.LOOP_SIZE)
-    """Delay and size (logarithm) of the loop beyond the predicted, each with its deviation."""
+    """Delay and gain (logarithm) of the loop beyond the prediction, each with its deviation."""
 
 
 def reference_paths(
     frequency_hz: FloatArray, closed: ComplexArray, deviation: FloatArray, predicted: ComplexArray,
     *, rate_hz: float, hold: Hold, holds: Sequence[Hold] = ("zero", "linear"),
 ) -> tuple[ReferencePath, ...]:  # fmt: skip
-    """The holds that may be, most likely first.
+    """Return the possible holds, most likely first.
 
     ``closed`` was evaluated with ``hold``; ``predicted`` is the open loop expected on the lines.
     """
@@ -68,7 +68,7 @@ def _fitted(
     weight: FloatArray,
     rate_hz: float,
 ) -> ReferencePath:
-    """Delay of the reference and delay and size of the loop, by robust linear least squares."""
+    """Delay of the reference and delay and gain of the loop, by robust linear least squares."""
     rows = np.log(closed / expected)
     turn = -2j * np.pi * f
     columns = np.column_stack([turn, s * turn, s])

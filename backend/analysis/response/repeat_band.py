@@ -1,11 +1,11 @@
-"""The band of a response: where another run of the same machine puts each line.
+"""The band of a response: the range in which a repeated run of the same machine puts each line.
 
-Noise between periods is the least part of it. Friction, backlash, ripple and the measured current
-distort each line by what depends on the excitation's phases (stochastic nonlinear contribution,
-Pintelon & Schoukens 2012, section 3.4): seen from one excitation as roughness from line to line,
-and on lines that are not excited. A second run has its own distortion, whose variance adds.
-What changes with the level is smooth over the lines and not seen in one run at all; it is charged
-by what friction and backlash can move: the pole that friction makes, and frequency and damping of
+Noise between periods is its smallest part. Friction, backlash, ripple and the measured current
+distort each line by an amount that depends on the excitation's phases (stochastic nonlinear
+contribution, Pintelon & Schoukens 2012, section 3.4): in a single recording it appears as roughness
+from line to line, and on lines that are not excited. A second run has its own distortion, whose
+variance adds. Changes with the level are smooth over the lines and not visible in one run; they are
+included by what friction and backlash can move: the pole of friction, and frequency and damping of
 modes.
 """
 
@@ -25,19 +25,20 @@ MODE_SHIFT = threshold.MODE_SHIFT
 DAMPING_SHIFT = threshold.DAMPING_SHIFT
 FRICTION_SHIFT = threshold.FRICTION_SHIFT
 _GAIN = float(np.hypot(threshold.BY_TEMPERATURE, threshold.BY_PLACE))
-#: Phase by sampling.
+#: Phase error from sampling, rad.
 _TURN = 0.01
-#: Two runs differ by the variances of both; at half the level noise and what friction distorts are
-#: twice as large next to the lines, so that the other one's variance is four times this one's.
+#: Factor on the variance for the difference of two runs: at half the level noise and friction
+#: distortion are twice as large relative to the lines, so the other run has four times the
+#: variance.
 _BOTH = 1.0 + 2.0**2
 
 
 @dataclass(frozen=True)
 class RepeatBand:
-    """Deviations [lines] of the logarithm: ``real`` (size) and ``imag`` (phase, radians).
+    """Deviations [lines] of the logarithm: ``real`` (magnitude) and ``imag`` (phase, radians).
 
-    ``scatter`` is what one run's line is off by stochastically, one component;
-    ``level`` what another level may move, both components.
+    ``scatter`` is the stochastic deviation of one run's line, per component;
+    ``level`` the possible change with the level, both components.
     """
 
     real: FloatArray
@@ -47,9 +48,9 @@ class RepeatBand:
 
 
 def line_scatter(left: ComplexArray, known: FloatArray) -> FloatArray:
-    """Scatter [lines] of one component, from the logarithm's residual of a model.
+    """Return the scatter [lines] per component, from the logarithm's residual of a model.
 
-    ``known`` [lines] is the part that noise explains; the roughness is never less.
+    ``known`` [lines] is the part that noise explains, which is the lower limit.
     """
     rough, kept = smooth_residual(left, threshold.REACH)
     variance = neighbour_mean(np.abs(rough) ** 2 / (2.0 * np.maximum(kept, 0.2)), threshold.POOL)
@@ -59,7 +60,7 @@ def line_scatter(left: ComplexArray, known: FloatArray) -> FloatArray:
 def repeat_band(
     f: FloatArray, scatter: FloatArray, model: ProductModel | None, modes: tuple[FoundMode, ...]
 ) -> RepeatBand:
-    """Band from the scatter of the lines and from what another level may move."""
+    """Return the band from the scatter of the lines and the possible changes with the level."""
     real = np.full(f.size, _GAIN**2)
     imag = np.full(f.size, _TURN**2)
     if model is not None:

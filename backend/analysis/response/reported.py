@@ -1,8 +1,8 @@
-"""What the reported speed and torque are, beyond what an estimate takes them to be.
+"""Checks the assumptions about the reported speed and torque.
 
-The reported speed is assumed to be the true one through one lag and one delay, and the reported
-torque to be behind the current loop. Some drives report the mean speed of several cycles, or the
-torque that they command. The position shows the first, a torque that follows at once the second.
+The reported speed is assumed to be the true one behind one lag and one delay, and the reported
+torque to be that behind the current loop. Some drives report the mean speed of several cycles, or
+the torque demand. The position reveals the first, a torque without any lag the second.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from backend.analysis.thresholds import reported as threshold
 
 
 def mean_cycles(records: tuple[Record, ...]) -> int | None:
-    """Cycles whose mean the reported speed is, by the positions; None where it is no mean.
+    """Return the number of cycles over which the reported speed is averaged; None if it is not.
 
-    A speed that is the way of several cycles over their time has nulls within the band, which no
-    lag has, and shows nothing that the positions do not.
+    A speed that is the travel of several cycles over their time has nulls within the band, which no
+    lag has, and contains nothing that the positions do not.
     """
     if any(r.position is None or r.excitation.segments for r in records):
         return None
@@ -35,7 +35,7 @@ def mean_cycles(records: tuple[Record, ...]) -> int | None:
 
 
 def _apart(record: Record, cycles: int) -> FloatArray:
-    """How far the reported speed is from a mean over these cycles [lines], relative to it."""
+    """Relative difference [lines] of the reported speed from a mean over these cycles."""
     e, place = record.excitation, record.position
     assert place is not None
     good, _ = good_periods(record)
@@ -44,27 +44,27 @@ def _apart(record: Record, cycles: int) -> FloatArray:
     before = np.concatenate([np.full(cycles, place[0]), place[:-cycles]])
     mean = (place - before) * (e.sample_rate_hz / cycles)
     reported, made = (period_spectra(x, e, good).mean(axis=0) for x in (record.response, mean))
-    # Low lines are alike whatever the speed is.
+    # At low lines all candidates are alike.
     upper = e.line_hz >= 0.5 * e.line_hz[-1]
     return np.asarray((np.abs(reported - made) / np.maximum(np.abs(reported), 1e-300))[upper])
 
 
 def commanded(path: SignalPath) -> bool:
-    """Whether the reported torque is the command: no current loop lies between them."""
+    """Return whether the reported torque is the demand: no current loop lies between them."""
     return (
         path.current_bandwidth_hz is not None and path.current_bandwidth_hz > threshold.COMMANDED_HZ
     )
 
 
 def current_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
-    """Logarithm of what an ordinary current loop takes that no recording shows, but its delay."""
+    """Return the log response of an ordinary, unrecorded current loop, without its delay."""
     return _without_delay(frequency_hz, np.log(lag_response(frequency_hz, threshold.USUAL_HZ)))
 
 
 def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray:
-    """Logarithm of what one lag of this corner may be next to two of the same delay.
+    """Return the logarithm of two lags over a single one of this corner with the same total delay.
 
-    A slow torque is an ordinary current loop behind a filter as well as one slow lag.
+    A slow torque may be an ordinary current loop behind a filter as well as one slow lag.
     """
     own_s, usual_s = 1.0 / corner_hz, 1.0 / threshold.USUAL_HZ
     two = lag_response(frequency_hz, threshold.USUAL_HZ) * lag_response(
@@ -74,9 +74,9 @@ def slow_uncertainty(frequency_hz: FloatArray, corner_hz: float) -> ComplexArray
 
 
 def path_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
-    """Logarithm of what a path may take that neither the drive nor its torque explains.
+    """Return the possible log response of a path that neither the drive nor its torque explains.
 
-    One lag more as slow as current loops hardly are, the delay of which is found to
+    One more lag, as slow as current loops hardly are, the delay of which is found to within
     `threshold.LATE_S`.
     """
     f = np.asarray(frequency_hz, dtype=np.float64)
@@ -85,7 +85,7 @@ def path_uncertainty(frequency_hz: FloatArray) -> ComplexArray:
 
 
 def charged(frf: Frf, lines_hz: FloatArray, uncertainty: ComplexArray) -> Frf:
-    """A wider band by an uncertainty that is known on ``lines_hz``."""
+    """Return the response with its band widened by an uncertainty given on ``lines_hz``."""
     size, turn = (
         np.interp(frf.frequency_hz, lines_hz, x) for x in (uncertainty.real, uncertainty.imag)
     )

@@ -1,9 +1,9 @@
-"""What an estimate from sampled signals shows of continuous mechanics.
+"""Response of continuous mechanics as an estimate from sampled signals shows it.
 
-What the bus samples is the true response plus its images folded back at multiples of the sample
-rate. Before a continuous model is compared with a measurement it is sent through the same hold,
-current loop, delay, speed or position loop and sampling (sum of images), so that the images
-explain themselves instead of bending the answer.
+A sampled signal contains the true response plus its images folded back at multiples of the sample
+rate. Before a continuous model is compared with a measurement it is passed through the same hold,
+current loop, delay, speed or position loop and sampling (sum of images), so that images are part of
+the model instead of biasing it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class LoopModel:
     c2: float = 0.0
 
     def response(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Controller response from velocity to torque reference (without the current loop)."""
+        """Return the response from velocity to torque reference (without the current loop)."""
         s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
         return np.asarray(self.c0 + self.c1 / s + self.c2 / s**2, dtype=np.complex128)
 
@@ -51,7 +51,7 @@ class Sampler:
     """The fixed part of `seen`: everything but the mechanics, at the lines and their images.
 
     Arrays [images, lines]; the true lines are row ``true``. ``integrated`` is for estimates from
-    the position: its spectrum times jω, so that images arrive weaker by f over their frequency.
+    the position: its spectrum times jω, so that each image is weaker by f over its own frequency.
     """
 
     frequency_hz: FloatArray
@@ -67,7 +67,7 @@ class Sampler:
     def of(
         frequency_hz: FloatArray, path: SignalPath, loop: LoopModel, *, integrated: bool = False
     ) -> Sampler:
-        """Precompute for these lines."""
+        """Return the sampler for these lines."""
         f = np.asarray(frequency_hz, dtype=np.float64)
         images = int(np.clip(np.ceil(threshold.HIGHEST_IMAGE_HZ / path.sample_rate_hz), 2, 6))
         all_f = f[None, :] + np.arange(-images, images + 1)[:, None] * path.sample_rate_hz
@@ -75,7 +75,7 @@ class Sampler:
         delay = delay_response(all_f, path.command_delay_s)
         controller = lag * loop.response(all_f) * delay_response(all_f, path.loop_delay_s)
         filtered = reported_response(all_f, path)
-        # The loop acts on the filtered speed whatever signal is evaluated.
+        # The loop acts on the filtered speed whichever signal is evaluated.
         seen_as = filtered
         if integrated:
             weaker = f[None, :] / all_f
@@ -88,7 +88,7 @@ class Sampler:
         )  # fmt: skip
 
     def thinned(self, lines: npt.NDArray[np.int64]) -> Sampler:
-        """Some of the lines."""
+        """Return the sampler for some of the lines."""
         return Sampler(
             self.frequency_hz[:, lines],
             self.true,
@@ -101,7 +101,7 @@ class Sampler:
         )
 
     def nearest(self, images: int) -> Sampler:
-        """Only so many images to either side: what comes from further off is weak."""
+        """Return a sampler with only this number of images on each side; further ones are weak."""
         rows = slice(max(self.true - images, 0), self.true + images + 1)
         return Sampler(
             self.frequency_hz[rows],
@@ -115,7 +115,7 @@ class Sampler:
         )
 
     def single(self) -> Sampler:
-        """In single precision, to rank very many."""
+        """Return the sampler in single precision, for ranking very many candidates."""
         parts = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "true"}
         small = {
             name: part.astype(np.float32 if name == "frequency_hz" else np.complex64)
@@ -124,7 +124,9 @@ class Sampler:
         return replace(self, **small)
 
     def shown(self, plants: ComplexArray, further: ComplexArray | None = None) -> ComplexArray:
-        """As `seen`, for many plants [n, images, lines] at once and without slopes: [n, lines]."""
+        """Return the estimate [n, lines] as `seen`, for many plants [n, images,
+        lines], no slopes.
+        """
         seen_as = self.seen_as if further is None else self.seen_as * further
         driven = self.torque / (1.0 + self.controller * plants)
         measured = np.sum(seen_as * plants * driven, axis=-2)
@@ -134,9 +136,9 @@ class Sampler:
     def seen(
         self, plant: ComplexArray, further: ComplexArray | None = None
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """What the direct estimate returns for this plant [images, lines].
+        """Return what the direct estimate gives for this plant [images, lines].
 
-        Also its slopes [images, lines] by the plant and by ``further``, a factor on the way of the
+        Also its slopes [images, lines] by the plant and by ``further``, a factor in the path of the
         evaluated signal alone.
         """
         seen_as = self.seen_as if further is None else self.seen_as * further
@@ -161,7 +163,8 @@ def seen_response(
     *,
     position_delay_s: float | None = None,
 ) -> ComplexArray:
-    """What the direct estimate (torque_mode, or torque_injection with a closed loop) would return.
+    """Return what the direct estimate (torque_mode, or torque_injection in a closed loop) would
+    give.
 
     ``delay_s`` is the delay from torque to reported velocity beyond the one in ``path``; with
     ``position_delay_s``, that to the position, the estimate is the one from the position.
@@ -196,7 +199,7 @@ class SampledFit:
     valid_band_hz: tuple[float, float]
 
     def image_factor(self, frequency_hz: FloatArray, *, integrated: bool = False) -> ComplexArray:
-        """What an estimate that ignores images returns, relative to the true response."""
+        """Return what an estimate that ignores images gives, relative to the true response."""
         late = self.position_delay_s if integrated else self.delay_s
         seen = seen_response(
             frequency_hz,
@@ -210,7 +213,7 @@ class SampledFit:
         return np.asarray(seen / true, dtype=np.complex128)
 
     def loop_image_factor(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Ratio of the loop's own torque to the velocity as sampled, relative to the true ratio."""
+        """Return the sampled over the true ratio of the loop's own torque to the velocity."""
         sampler = Sampler.of(frequency_hz, self.path, self.loop)
         plant = self.model.response(sampler.frequency_hz) * delay_response(
             sampler.frequency_hz, self.delay_s

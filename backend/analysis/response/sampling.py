@@ -1,9 +1,9 @@
-"""What lies between an injected sequence and the drive's continuous signals.
+"""The signal path between an injected sequence and the drive's continuous signals.
 
 The bus sends one value per cycle of length T; the drive holds it (zero-order), or interpolates
 towards it when 60C2h is in use (linear, one cycle later), passes it through the current loop
-(first order here) and a delay. All of that is known and can be divided out; what sampling folds
-back above half the sample rate is not, see :mod:`backend.analysis.response.sampled_model`.
+(first order here) and a delay. All of that is known and can be divided out; the images that
+sampling folds back are not, see :mod:`backend.analysis.response.sampled_model`.
 """
 
 from __future__ import annotations
@@ -51,12 +51,12 @@ class SignalPath:
 
 
 def lead_s(hold: Hold) -> float:
-    """How much earlier than whole cycles say a hold's torque is, in s."""
+    """Return the time [s] by which a hold's torque leads whole cycles."""
     return STEP_LEAD_S if hold == "linear" else 0.0
 
 
 def command_delay_s(cycles: float, hold: Hold, sample_rate_hz: float) -> float:
-    """Delay of a path whose setpoints take effect after so many cycles, in s; 0 cycles at least.
+    """Return the delay [s] of a path whose setpoints take effect after so many cycles, at least 0.
 
     Negative by the lead where a drive begins its interpolation in the cycle of the setpoint.
     """
@@ -64,12 +64,12 @@ def command_delay_s(cycles: float, hold: Hold, sample_rate_hz: float) -> float:
 
 
 def cycles_of(path: SignalPath) -> float:
-    """After how many cycles setpoints take effect: the reverse of `command_delay_s`."""
+    """Return the cycles after which setpoints take effect: the inverse of `command_delay_s`."""
     return (path.command_delay_s + lead_s(path.hold)) * path.sample_rate_hz
 
 
 def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -> ComplexArray:
-    """Frequency response of the hold, unit gain at 0 Hz."""
+    """Return the frequency response of the hold, unit gain at 0 Hz."""
     x = np.asarray(frequency_hz, dtype=np.float64) / sample_rate_hz
     zero = np.sinc(x) * np.exp(-1j * np.pi * x)
     # Linear interpolation reaches a value one cycle after it was sent: the square of the hold.
@@ -77,7 +77,7 @@ def hold_response(frequency_hz: FloatArray, sample_rate_hz: float, hold: Hold) -
 
 
 def lag_response(frequency_hz: FloatArray, bandwidth_hz: float | None) -> ComplexArray:
-    """First-order lag with this corner; None is no lag."""
+    """Return the response of a first-order lag with this corner; None is no lag."""
     f = np.asarray(frequency_hz, dtype=np.float64)
     if bandwidth_hz is None:
         return np.ones(f.shape, dtype=np.complex128)
@@ -85,13 +85,13 @@ def lag_response(frequency_hz: FloatArray, bandwidth_hz: float | None) -> Comple
 
 
 def delay_response(frequency_hz: FloatArray, delay_s: float) -> ComplexArray:
-    """Pure delay."""
+    """Return the response of a pure delay."""
     f = np.asarray(frequency_hz, dtype=np.float64)
     return np.asarray(np.exp(-2j * np.pi * f * delay_s), dtype=np.complex128)
 
 
 def command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """From the sent sequence to the continuous torque it causes directly."""
+    """Return the response from the sent sequence to the continuous torque it causes directly."""
     return (
         path.direct_gain
         * hold_response(frequency_hz, path.sample_rate_hz, path.hold)
@@ -101,14 +101,14 @@ def command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray
 
 
 def reported_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """From the true to the reported quantity: speed filter and delay."""
+    """Return the response from the true to the reported quantity: speed filter and delay."""
     return lag_response(frequency_hz, path.response_bandwidth_hz) * delay_response(
         frequency_hz, path.response_delay_s
     )
 
 
 def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
-    """The part of the *sampled* torque that the sent sequence causes directly.
+    """Return the part of the *sampled* torque that the sent sequence causes directly.
 
     Exact for a first-order current loop, any delay and both holds. With no delay and a
     zero-order hold it is u[k] = a·u[k-1] + (1-a)·r[k-1], a = exp(-2π·f_c·T).
@@ -119,7 +119,7 @@ def sampled_command(sent: FloatArray, path: SignalPath) -> FloatArray:
 
 
 def sampled_command_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """Response of `sampled_command`, from the spectrum of what was sent to that of the samples."""
+    """Return the response of `sampled_command`, from the sent spectrum to that of the samples."""
     numerator, a, whole = _difference_equation(path)
     z = np.exp(-2j * np.pi * np.asarray(frequency_hz) / path.sample_rate_hz)
     top = np.polyval(numerator[::-1], z) * z**whole
@@ -127,11 +127,11 @@ def sampled_command_response(frequency_hz: FloatArray, path: SignalPath) -> Comp
 
 
 def rising_command(sent: FloatArray, path: SignalPath) -> FloatArray:
-    """What the *sampled* torque shows of a sequence's integral (s) beyond its mean per cycle.
+    """Return the *sampled* torque of a sequence's integral (s) in excess of its mean per cycle.
 
     A speed loop integrates the reference that it holds, so that the integral rises within each
-    cycle: a sawtooth around a mean that `sampled_command` knows. Exact for a first-order current
-    loop and any delay; a line that is interpolated is near its mean where it is sampled.
+    cycle: a sawtooth around the mean that `sampled_command` covers. Exact for a first-order current
+    loop and any delay; zero with interpolation, where the samples are near the mean.
     """
     if path.hold == "linear":
         return np.zeros_like(sent)
@@ -141,7 +141,7 @@ def rising_command(sent: FloatArray, path: SignalPath) -> FloatArray:
 
 
 def sampled_integral_response(frequency_hz: FloatArray, path: SignalPath) -> ComplexArray:
-    """Response in s from the sent sequence to the samples of its integral, as a torque."""
+    """Return the response [s] from the sent sequence to its sampled integral, as a torque."""
     f = np.asarray(frequency_hz, dtype=np.float64)
     mean = -0.5j / path.sample_rate_hz / np.tan(np.pi * f / path.sample_rate_hz)
     rises = np.zeros_like(mean)
@@ -153,7 +153,7 @@ def sampled_integral_response(frequency_hz: FloatArray, path: SignalPath) -> Com
 
 
 def _sawtooth(path: SignalPath) -> tuple[FloatArray, float, int]:
-    """As `_difference_equation`, of time less half a cycle while a value is held."""
+    """Difference equation as `_difference_equation`, for the sawtooth within a hold period."""
     period_s = 1.0 / path.sample_rate_hz
     whole, part = divmod(path.command_delay_s, period_s)
     corner = path.current_bandwidth_hz
@@ -171,18 +171,19 @@ def _sawtooth(path: SignalPath) -> tuple[FloatArray, float, int]:
 
 
 def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
-    """Numerator, the one pole, and whole cycles of delay before them."""
+    """Numerator, the single pole, and whole cycles of delay before them."""
     period_s = 1.0 / path.sample_rate_hz
     whole, part = divmod(path.command_delay_s, period_s)
     wc = None if path.current_bandwidth_hz is None else 2 * np.pi * path.current_bandwidth_hz
 
     def after(t: FloatArray) -> FloatArray:
-        """Response to a value that stays: at once (zero hold), or reached within a cycle."""
+        """Response to a step: immediate (zero hold), or reached within one cycle."""
         if path.hold == "zero":
             return np.asarray((t > 0) * 1.0 if wc is None else -np.expm1(-wc * np.maximum(t, 0.0)))
         if wc is None:
             return np.asarray(np.clip(t / period_s, 0.0, 1.0))
-        # The line is one of steps, which the sampled torque shows where cycles are short.
+        # The drive interpolates in small steps, which the sampled torque shows where cycles are
+        # short.
         steps = max(round(period_s / (2 * STEP_LEAD_S)), 1)
         begun = t[:, None] - STEP_LEAD_S - np.arange(steps) * (period_s / steps)
         return np.asarray(np.mean(-np.expm1(-wc * np.maximum(begun, 0.0)), axis=1))
@@ -192,6 +193,6 @@ def _difference_equation(path: SignalPath) -> tuple[FloatArray, float, int]:
     a = 0.0 if wc is None else float(np.exp(-wc * period_s))
     numerator = impulse - a * np.concatenate([[0.0], impulse[:-1]])
     if whole < 0.0:
-        # A line that begins before its setpoint's cycle does is not yet at its value there.
+        # An interpolation that begins before its setpoint's cycle has not reached its value there.
         return numerator[1:], a, int(whole) + 1
     return numerator, a, int(whole)

@@ -1,4 +1,4 @@
-"""What is charged to the stated band of an estimate, beyond what its scatter shows."""
+"""Contributions to the stated band of an estimate beyond its scatter."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _CI95 = 1.96
 
 
 def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
-    """Lines that no model explains: neither hold and delay nor images are known of them.
+    """Return lines that no model explains, for which neither hold and delay nor images are known.
 
-    What the best model leaves of this ``view`` is charged to them, and that another hold may be
-    the right one.
+    The residual of the best model in this ``view`` is added to their band, and the possibility that
+    the other hold is the right one.
     """
     f, rate = raw.frequency_hz, raw.sample_rate_hz
     misfit = solution.problem.logs(solution.x)[0][view]
@@ -43,10 +43,11 @@ def unexplained(raw: Frf, solution: Solution, view: int) -> Frf:
 
 
 def ended_where_unknown(frf: Frf) -> Frf:
-    """The band ends where a model alone shows the lines, and shows most of them too roughly.
+    """Return the response with the band ended where lines depend on the model and are too
+    uncertain.
 
     A resonance beyond half the sample rate may fold back more than the axis itself does there.
-    Lines that are uncertain below others that are not, as next to an antiresonance, end no band.
+    Uncertain lines below accurate ones, as next to an antiresonance, do not end the band.
     """
     f, (low, high) = frf.frequency_hz, frf.valid_band_hz
     direct_hz = DIRECT_SHARE * frf.sample_rate_hz
@@ -66,7 +67,7 @@ def ended_where_unknown(frf: Frf) -> Frf:
 
 
 def distorted(frf: Frf, share: FloatArray) -> Frf:
-    """Charge what friction does not explain of the motion between the lines to the lines, too."""
+    """Return the response with the motion that friction does not explain added to its band."""
     return replace(
         frf,
         std_db=np.hypot(frf.std_db, 20 / np.log(10) * share),
@@ -75,9 +76,9 @@ def distorted(frf: Frf, share: FloatArray) -> Frf:
 
 
 def pooled(parts: list[Frf]) -> Frf:
-    """Each line by what is known best; the errors of two views of one motion may be the same.
+    """Combine estimates line by line by accuracy; the errors of two views may be the same.
 
-    A third view is made of the other two, and used where it is better than both together.
+    A third view is a combination of the other two, and used where it is better than their mean.
     """
     if len(parts) == 1:
         return parts[0]
@@ -108,7 +109,9 @@ def _better(one: Frf, other: Frf) -> Frf:
 
 
 def widened(frf: Frf, factor: ComplexArray, share: float, uncertainty: ComplexArray) -> Frf:
-    """Charge a share of the image factor, the uncertainty and the least error to the band."""
+    """Return the response with its band widened by a share of the image factor, the uncertainty and
+    the smallest error.
+    """
     image = np.log(factor)
     uncertainty_db = 20 / np.log(10) * np.hypot(image.real * share, uncertainty.real)
     uncertainty_deg = np.degrees(np.hypot(image.imag * share, uncertainty.imag))
@@ -122,8 +125,8 @@ def widened(frf: Frf, factor: ComplexArray, share: float, uncertainty: ComplexAr
 def without_images(
     direct: Frf, factor: ComplexArray, jitter_s: float, uncertainty: ComplexArray
 ) -> Frf:
-    """The lines without what sampling folds back, and the band that is left to them."""
-    # The correction is as uncertain as the model: a part of it stays in the band, too.
+    """Return the lines without the folded images, and with the band that then remains."""
+    # The correction is as uncertain as the model: a part of it stays in the band.
     return replace(
         widened(direct, factor, threshold.IMAGES_LEFT, uncertainty),
         response=np.asarray(direct.response / factor),

@@ -1,4 +1,4 @@
-"""Speed and position as two samples of one motion, which are folded differently.
+"""Speed and position as two samples of one motion, with different aliasing.
 
 Each gives an estimate of its own; both together give one without the nearest image.
 """
@@ -19,7 +19,7 @@ from backend.analysis.thresholds import two_signals as threshold
 
 @dataclass(frozen=True)
 class Way:
-    """One estimate without delay and filter: its lines, their images, their uncertainties."""
+    """One estimate without delay and filter: its lines, image factor and uncertainties."""
 
     lines: Frf
     factor: ComplexArray
@@ -30,10 +30,10 @@ class Way:
 def ways_of(
     velocity: Frf, position: Frf | None, path: SignalPath, fit: SampledFit, uncertainty: Uncertainty
 ) -> list[Way]:
-    """From velocity, from position where there is one, and then from both together.
+    """Return estimates from the velocity, from the position where recorded, and from both together.
 
-    ``path`` is the one that the estimates were made with: what it does not report of the speed's
-    filter the fit does.
+    ``path`` is the one that the estimates were made with: a speed filter that it does not state is
+    taken from the fit.
     """
     f = velocity.frequency_hz
     late = delay_response(f, fit.delay_s)
@@ -51,11 +51,11 @@ def ways_of(
 
 
 def _without_first_image(velocity: Way, position: Way, fit: SampledFit) -> Way:
-    """Both estimates together, so weighed that the nearest image cancels.
+    """Combine both estimates with weights for which the nearest image cancels.
 
-    Speed and position are samples of one motion that are folded differently: what comes back from
-    f - fs arrives in the position weaker by f/(f - fs), in the speed with its filter. Two samples
-    of one motion show twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652).
+    Speed and position are samples of one motion with different aliasing: the image from
+    f - fs is weaker in the position by f/(f - fs), in the speed by its filter. Two samples
+    of one motion determine twice the band (Papoulis, IEEE Trans. Circuits Syst. 24 (1977) 652).
     """
     f = velocity.lines.frequency_hz
     folded = f - velocity.lines.sample_rate_hz

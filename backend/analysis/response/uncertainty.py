@@ -1,8 +1,8 @@
-"""How far a line may be off because path and mechanics that correct it are not known exactly.
+"""Uncertainty of a line from the uncertainty of the path and the mechanics that correct it.
 
 The fit's parameters and those of the path (delay in cycles, log of the current loop's corner) have
-one joint covariance: what the recorded torque leaves open of the path, the motion may show, and
-what both leave open is charged to the lines by their slopes (linear propagation, Pintelon &
+one joint covariance: the motion may determine what the recorded torque leaves open of the path, and
+what both leave open is added to the lines by their slopes (linear propagation, Pintelon &
 Schoukens, *System Identification*, 2012, section 2.4).
 """
 
@@ -17,13 +17,13 @@ from backend.analysis.mechanics.fit_problem import Problem, View, robust_rows
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
-#: Places of the delays and of the speed filter among a fit's parameters.
+#: Indices of the delays and of the speed filter among a fit's parameters.
 _DELAY, _POSITION_DELAY, _FILTER = 2, 3, 4
 
 
 @dataclass(frozen=True)
 class Shifted:
-    """The views as another path makes them, ``step`` away in one of the path's parameters."""
+    """The views for another path, ``step`` away in one of the path's parameters."""
 
     views: tuple[View, ...]
     step: float
@@ -31,10 +31,11 @@ class Shifted:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """One standard deviation per view and line, as the logarithm: real is size, imaginary phase.
+    """One standard deviation per view and line of the logarithm: real is magnitude, imaginary
+    phase.
 
     ``corrected`` for lines with images removed, ``direct`` for those with them. ``path_step`` is
-    where torque and motion together would have the path, from where it was taken.
+    the step from the given path to the one that torque and motion together determine.
     """
 
     corrected: tuple[ComplexArray, ...]
@@ -42,7 +43,7 @@ class Uncertainty:
     path_step: FloatArray
     path_std: FloatArray
     covariance: FloatArray
-    """Of the fit's parameters, [n, n]."""
+    """Covariance [n, n] of the fit's parameters."""
 
 
 def uncertainty(
@@ -52,9 +53,10 @@ def uncertainty(
     path_covariance: FloatArray,
     moved: FloatArray,
 ) -> Uncertainty:
-    """Joint uncertainty at a solution ``x``; ``path_covariance`` [n, n] is known of the n shifts.
+    """Return the joint uncertainty at a solution ``x``; ``path_covariance`` [n, n] is that of the
+    ``shifted`` path parameters from the torque alone.
 
-    ``moved`` [n] is how far the path already is from where the torque alone would have it.
+    ``moved`` [n] is the distance of the path from the one that the torque alone gives.
     """
     residuals, jacobian = problem.misfit(x)
     root = robust_rows(residuals)
@@ -89,7 +91,7 @@ def uncertainty(
         tuple(direct),
         step[x.size :],
         np.sqrt(np.maximum(np.diag(covariance)[x.size :], 0.0)),
-        # All lines together may be explained better than each of a few is known.
+        # All lines together may be explained better than the accuracy of single ones suggests.
         covariance[: x.size, : x.size] / min(variance, 1.0),
     )
 
@@ -115,7 +117,7 @@ def _plant_slopes(problem: Problem, x: FloatArray) -> ComplexArray:
 
 
 def _late_slopes(problem: Problem, view: View, x: FloatArray) -> ComplexArray:
-    """Slopes of what a direct estimate takes out: delay and speed filter [parameters, lines]."""
+    """Slopes of what a direct estimate removes: delay and speed filter [parameters, lines]."""
     slopes = np.zeros((x.size, view.f.size), dtype=np.complex128)
     turn = 1j * TURN * view.f * problem.period_s
     slopes[_POSITION_DELAY if view.integrated else _DELAY] = turn

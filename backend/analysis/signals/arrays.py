@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# The precision is numpy's own parameter: its functions return the abstract kinds.
+# The precision is numpy's own type parameter: its functions return the abstract kinds.
 FloatArray = NDArray[np.floating[Any]]
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 IntArray = NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""Logarithmic chirps, repeated without a pause or played once.
+"""Logarithmic chirps, repeated without a pause or single.
 
 Source: Novak et al., JAES 63 (2015) 786.
 """
@@ -15,9 +15,9 @@ from backend.analysis.signals.ramps import cosine_ramp, settled_ramp
 def chirp_period(
     sample_rate_hz: float, period_samples: int, f_min_hz: float, f_max_hz: float, realisation: int
 ) -> FloatArray:
-    """One period of a logarithmic chirp that is repeated without a pause.
+    """Return one period of a logarithmic chirp that is repeated without a pause.
 
-    Realisations differ in direction (up, down) and in where the period begins.
+    Realisations differ in direction (up, down) and in the start point of the period.
     """
     t = np.arange(period_samples) / sample_rate_hz
     rate = np.log(f_max_hz / f_min_hz) * sample_rate_hz / period_samples
@@ -28,9 +28,9 @@ def chirp_period(
 
 
 def band_limited(period: FloatArray, lines: IntArray, amplitude: FloatArray) -> FloatArray:
-    """A period without its bins below the first and above the last line, peak 1.
+    """Return a period without its bins below the first and above the last line, peak 1.
 
-    ``amplitude`` [len(lines)] weighs the rest, interpolated between the lines.
+    ``amplitude`` [len(lines)] weights the remaining bins, interpolated between the lines.
     """
     spectrum = np.fft.rfft(period)
     bins = np.arange(spectrum.size)
@@ -50,13 +50,13 @@ def chirp(
     falloff_corner_hz: float | None = None,
     integrations: int = 0,
 ) -> Excitation:
-    """Logarithmic chirp: the same time per octave, amplitude falling on request.
+    """Return a logarithmic chirp: the same time per octave, optionally with falling amplitude.
 
-    The correction that brings the axis back to rest is spread over the whole signal, where it
+    The correction that returns the axis to standstill is spread over the whole signal, where it
     stays far below the measured band.
 
     Raises:
-        ValueError: the frequencies or the length make no signal at this rate.
+        ValueError: the frequencies or the length give no signal at this rate.
     """
     n = round(duration_s * sample_rate_hz)
     ramp = min(round(ramp_s * sample_rate_hz), n // 4)

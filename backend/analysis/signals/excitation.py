@@ -1,11 +1,11 @@
-"""Excitation signals as pure data: arrays and what an estimator must know about them.
+"""Excitation signals as pure data: arrays, and the structure that an estimator needs.
 
 Amplitudes are dimensionless (1.0 is the peak of the exciting part); the player scales them to
 torque, speed or position. Every signal starts and ends at zero. With ``integrations`` the
 ramps carry a small correction, so that an ideal axis (torque: two integrations, velocity: one,
-position: none) stops at the place where it began and does not drift meanwhile.
+position: none) stops where it began and does not drift during the measurement.
 
-Here is the multisine; :mod:`chirp`, :mod:`prbs` and :mod:`stepped_sine` make the others.
+This module makes the multisine; :mod:`chirp`, :mod:`prbs` and :mod:`stepped_sine` the others.
 Source: Pintelon & Schoukens, *System Identification: A Frequency Domain Approach* (2012),
 ch. 2 (multisines, crest factor) and ch. 4 (odd lines).
 """
@@ -38,7 +38,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Excitation:
-    """A signal to be played, sample by sample, and its structure.
+    """A signal to be sent sample by sample, and its structure.
 
     ``samples`` [n] contains ramps, base motion and all periods. Period ``p`` covers samples
     ``first_sample + p * period_samples`` onwards; the first ``transient_periods`` of the
@@ -81,7 +81,7 @@ class Excitation:
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """A slow sine below the measured band that keeps the axis moving and so defeats stiction.
+    """A slow sine below the measured band that keeps the axis moving and so avoids stiction.
 
     ``amplitude`` is relative to the exciting part's peak of 1; the frequency is moved to the
     nearest whole number of cycles per period.
@@ -92,7 +92,7 @@ class BaseMotion:
 
 
 def crest_factor(signal: FloatArray) -> float:
-    """Peak over RMS of a signal without its mean.
+    """Return peak over RMS of a signal without its mean.
 
     Raises:
         ValueError: the signal is constant.
@@ -113,11 +113,11 @@ def choose_lines(
     count: int | None = None,
     odd_only: bool = False,
 ) -> IntArray:
-    """Excited bins between two frequencies, at most ``count`` of them.
+    """Return the excited bins between two frequencies, at most ``count`` of them.
 
-    ``odd_only`` takes odd bins alone, and leaves one of every four of them empty: even-order
-    distortion then falls on the even bins and odd-order distortion on those that were left out.
-    Which one of four is drawn, and always the same (random odd multisine).
+    ``odd_only`` selects odd bins only and leaves one in every four of them empty: even-order
+    distortion then falls on the even bins and odd-order distortion on the empty odd ones. The empty
+    one of each four is drawn at random with a fixed seed (random odd multisine).
 
     Raises:
         ValueError: no bin lies between the two frequencies.
@@ -144,7 +144,7 @@ def choose_lines(
 
 
 def falling_amplitude(frequency_hz: FloatArray, corner_hz: float, order: float = 1.0) -> FloatArray:
-    """Line amplitudes flat to a corner and falling with ``order`` (1 is 20 dB/decade) above."""
+    """Return line amplitudes, flat up to a corner and falling with ``order`` (1: 20 dB/decade)."""
     return np.asarray((1.0 + (frequency_hz / corner_hz) ** 2) ** (-order / 2.0), dtype=np.float64)
 
 
@@ -163,16 +163,16 @@ def multisine(
     iterations: int = 200,
     invert: bool = False,
 ) -> Excitation:
-    """Random-phase multisine with optimised crest factor.
+    """Return a random-phase multisine with optimised crest factor.
 
     ``amplitude`` [len(lines)] shapes the lines; None is flat. ``realisation`` seeds the phases.
-    ``invert`` turns the exciting part's sign and leaves the base motion: the friction that the
-    base motion causes then cancels between such a pair. ``ramp_samples`` defaults to half a
+    ``invert`` reverses the sign of the exciting part but not of the base motion: the friction that
+    the base motion causes then cancels between such a pair. ``ramp_samples`` defaults to half a
     period.
 
     Raises:
-        ValueError: a line that cannot be played, too few periods, or amplitudes that do not fit the
-            lines.
+        ValueError: a line outside the usable band, too few periods, or amplitudes that do not match
+            the lines.
     """
     lines = np.asarray(lines, dtype=np.int64)
     if lines.size == 0 or lines[0] < 1 or 2 * lines[-1] >= period_samples:
@@ -204,7 +204,7 @@ def repeated(
     integrations: int = 0,
     invert: bool = False,
 ) -> Excitation:
-    """Any period, played again and again; ``lines`` are its bins that are evaluated.
+    """Return an excitation that repeats a given period; ``lines`` are its evaluated bins.
 
     Base motion, ramps and ``invert`` as for :func:`multisine`.
 
@@ -237,9 +237,9 @@ def repeated(
 
 
 def scaled(excitation: Excitation, amplitude: float, step: float = 0.0) -> Excitation:
-    """The signal in units of the injection, rounded to ``step`` as the bus object will be.
+    """Return the signal in units of the injection, rounded to ``step`` as the bus object will be.
 
-    Estimators must be given what was really sent, that is this rounded signal.
+    Estimators must be given the values as sent, that is this rounded signal.
     """
     samples = excitation.samples * amplitude
     if step > 0:

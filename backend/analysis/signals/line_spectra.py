@@ -1,6 +1,6 @@
-"""Recordings as spectra on the excited lines, and what really drove the axis there.
+"""Recordings as spectra on the excited lines, and the input that actually drove the axis.
 
-What the torque was between two bus cycles is reconstructed from the sent sequence, see
+The torque between two bus cycles is reconstructed from the sent sequence, see
 :mod:`backend.analysis.response.sampling`. Periods with a lost cycle are left
 out, never interpolated.
 """
@@ -25,19 +25,21 @@ from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray,
 from backend.analysis.signals.excitation import Excitation, Segment
 from backend.analysis.thresholds import line_spectra as threshold
 
-#: *torque_mode*: nothing but the injection makes torque. *torque_injection*: a speed or position
-#: loop adds its own torque. *closed_loop*: from the loop's reference to the response.
+#: *torque_mode*: the injection is the only source of torque. *torque_injection*: a speed or
+#: position loop adds its own torque. *closed_loop*: from the loop's reference to the response.
 Quantity = Literal["torque_mode", "torque_injection", "closed_loop"]
 
 
 @dataclass(frozen=True)
 class Record:
-    """One played excitation: ``excitation.samples`` are the sent values in units of the injection.
+    """One recorded excitation: ``excitation.samples`` are the sent values in units of the
+    injection.
 
     ``response`` [n] is velocity or position, ``torque`` [n] the reported torque (needed for
     *torque_injection*), ``valid`` [n] False where a cycle was lost or late, ``position`` [n] the
-    integral of a velocity ``response`` as the drive reports it. ``told_direction`` [n] is the mean
-    true direction of motion between each sample and the next where more than the speed shows it.
+    integral of a velocity ``response`` as the drive reports it. ``known_direction`` [n] is the mean
+    true direction of motion between each sample and the next, where it is known better than from
+    the speed.
     """
 
     excitation: Excitation
@@ -63,9 +65,9 @@ class Record:
                 raise ValueError(f"signals must have {n} samples, as the excitation has")
 
     def direction(self, lag_s: float) -> FloatArray:
-        """Mean direction of motion between each sample and the next [n], -1 to 1.
+        """Return the mean direction of motion between each sample and the next [n], -1 to 1.
 
-        ``lag_s`` is how late the response is, a velocity. It is asked for again and again.
+        ``lag_s`` is the lag of the response, a velocity. Results are cached by lag.
         """
         key = round(lag_s, 7)
         if key not in self._directions:
@@ -78,9 +80,9 @@ class Record:
 class LineSpectra:
     """Line spectra of all good periods: arrays [m realisations][p periods, lines].
 
-    ``torque`` is the loop's own torque (of a *closed_loop* all of it, where it was recorded),
-    ``direction`` the direction of motion (-1 to 1) that
-    Coulomb friction follows, when it does (the speed is reported late).
+    ``torque`` is the loop's own torque (for *closed_loop* the whole torque, where it was recorded),
+    ``direction`` the true direction of motion (-1 to 1) that determines Coulomb friction; the
+    reported speed lags behind it.
     """
 
     frequency_hz: FloatArray
@@ -96,10 +98,11 @@ class LineSpectra:
 
 
 def good_periods(record: Record) -> tuple[list[int], int]:
-    """Numbers of the usable periods, and how many had to be dropped.
+    """Return the numbers of the usable periods, and how many had to be dropped.
 
-    A gap spoils its own period; the one after it is kept, since the axis itself saw nothing. A
-    position is looked at from each sample to the next, so that the one after a period counts.
+    A gap spoils its own period only; the next one is kept, since the axis itself was not disturbed.
+    A position is differenced from each sample to the next, so the sample after a period is needed
+    too.
     """
     e = record.excitation
     if e.segments:
@@ -117,7 +120,7 @@ def good_periods(record: Record) -> tuple[list[int], int]:
 
 
 def _good_halves(record: Record) -> tuple[list[int], int]:
-    """The two halves of all tones of a stepped sine count as two periods.
+    """Usable halves: the two halves of all tones of a stepped sine count as two periods.
 
     A gap in one tone spoils its half for all of them: a spectrum needs every line.
     """
@@ -139,7 +142,7 @@ def _half_of(segment: Segment, half: int) -> slice:
 
 
 def tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> ComplexArray:
-    """Amplitudes [halves, tones] of a stepped sine, least squares in addition to mean and drift."""
+    """Return amplitudes [halves, tones] of a stepped sine, fitted together with mean and drift."""
     found = np.zeros((len(halves), len(e.segments)), dtype=np.complex128)
     for i, segment in enumerate(e.segments):
         for j, half in enumerate(halves):
@@ -153,7 +156,7 @@ def tone_amplitudes(signal: FloatArray, e: Excitation, halves: list[int]) -> Com
 
 
 def period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> ComplexArray:
-    """Spectra [periods, lines], with the drift between the periods removed.
+    """Return the spectra [periods, lines], with the drift between the periods removed.
 
     A drift of s per sample would leak onto every line; the difference of the means of two
     periods is exactly s·N for a periodic signal plus drift, whatever the signal is.
@@ -172,10 +175,10 @@ def period_spectra(signal: FloatArray, e: Excitation, periods: list[int]) -> Com
 def velocity_from_position(
     record: Record, e: Excitation, periods: list[int], rate: float
 ) -> ComplexArray:
-    """Spectra [periods, lines] of the velocity by way of the reported position.
+    """Return the spectra [periods, lines] of the velocity derived from the reported position.
 
-    What is transformed is how far the axis went from one sample to the next: the mean velocity
-    between them, exactly. A position that ends elsewhere than it began would leak onto every line.
+    The transform is taken of the travel between successive samples, which is exactly the mean
+    velocity between them. A position that ends elsewhere than it began would leak onto every line.
 
     Raises:
         ValueError: the recording has no position.
@@ -192,10 +195,10 @@ def velocity_from_position(
 def collect(
     records: tuple[Record, ...], path: SignalPath, quantity: Quantity, *, position: bool = False
 ) -> LineSpectra:
-    """Spectra of all good periods; ``position`` takes the velocity from the reported position.
+    """Return the spectra of all good periods; ``position``: with the velocity from the position.
 
     Raises:
-        ValueError: no period is whole, or the records do not belong together.
+        ValueError: no period is complete, or the records do not belong together.
     """
     first = records[0].excitation
     if first.period_samples == 0 and not first.segments:
@@ -233,7 +236,7 @@ def collect(
 
 
 def own_torque(record: Record, path: SignalPath) -> FloatArray:
-    """The sampled torque without what the injection contributes to it: the loop's own part.
+    """Return the sampled torque without the contribution of the injection: the loop's own part.
 
     Raises:
         ValueError: the recording has no reported torque.
@@ -244,9 +247,9 @@ def own_torque(record: Record, path: SignalPath) -> FloatArray:
 
 
 def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
-    """How much later the speed is reported than the position, in s: a filter, or a mean.
+    """Return the lag of the reported speed behind the position, s: due to a filter, or averaging.
 
-    Without positions it is what ``path`` reports of a filter.
+    Without positions it is the lag of the filter that ``path`` states.
     """
     reported = path.response_bandwidth_hz
     known = 0.0 if reported is None else 1.0 / (2 * np.pi * reported)
@@ -271,7 +274,7 @@ def speed_lag_s(records: tuple[Record, ...], path: SignalPath) -> float:
 def friction_direction(
     record: Record, e: Excitation, periods: list[int], path: SignalPath, lag_s: float
 ) -> ComplexArray:
-    """Spectra [periods, lines] of the true direction of motion, on the lines of ``e``.
+    """Return the spectra [periods, lines] of the true direction of motion, on the lines of ``e``.
 
     ``lag_s`` as from :func:`speed_lag_s`.
     """
@@ -285,9 +288,9 @@ def friction_direction(
 def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray:
     """Mean sign of the velocity between each sample and the next.
 
-    A filtered speed changes its sign late, and what it then does is not the filtered sign: its
-    lag is removed from it before (as of a first-order filter). What swings near half the sample
-    rate is no straight line from sample to sample; it is interpolated as the band allows.
+    A filtered speed changes its sign late and is then not the filtered sign of the true speed: its
+    lag is removed first (as of a first-order filter). A component near half the sample rate is not
+    a straight line from sample to sample, so the speed is interpolated within the band.
     """
     fine = scipy.signal.resample_poly(velocity, threshold.FINER, 1, window=("kaiser", 8.0))
     fine = fine + lag_s * rate_hz * threshold.FINER * np.gradient(fine)
@@ -300,7 +303,7 @@ def _direction(velocity: FloatArray, lag_s: float, rate_hz: float) -> FloatArray
 
 
 def _centre_of_interval(frequency_hz: FloatArray, sample_rate_hz: float) -> ComplexArray:
-    """Turns a spectrum of interval means into that of the signal at the interval's start."""
+    """Factor from the spectrum of interval means to that of the signal at the interval's start."""
     x = frequency_hz / sample_rate_hz
     return np.asarray(np.exp(-1j * np.pi * x) / np.sinc(x), dtype=np.complex128)
 
@@ -313,7 +316,7 @@ def continuous_input(
     *,
     position: bool = False,
 ) -> list[ComplexArray]:
-    """What really drove the measured quantity, per realisation [periods, lines]."""
+    """Return the input that actually drove the quantity, per realisation [periods, lines]."""
     f = s.frequency_hz
     inputs: list[ComplexArray]
     if quantity == "closed_loop":
@@ -334,7 +337,7 @@ def continuous_input(
 
 
 def _late(s: LineSpectra, path: SignalPath, *, position: bool) -> ComplexArray:
-    """From the true quantity to the reported one; no filter lies in the way of a position."""
+    """Response from the true quantity to the reported one; a position passes no filter."""
     if position:
         return delay_response(s.frequency_hz, path.response_delay_s)
     return reported_response(s.frequency_hz, path)
@@ -348,11 +351,12 @@ def friction_input(
     *,
     position: bool = False,
 ) -> list[ComplexArray]:
-    """What one Nm of Coulomb friction takes from the inputs, per realisation [periods, lines].
+    """Return the effect of 1 Nm of Coulomb friction on the inputs, per realisation [periods,
+    lines].
 
-    Within a closed speed loop it takes what of the reference would have made that torque. Its
-    controller is the recorded torque over the recorded error, which no friction changes: with
-    speed y = P·(u - d) and torque u = C·(r - y) the response is y = T·(r - d/C). Nothing where
+    Within a closed speed loop it is the part of the reference that would have caused that torque.
+    Its controller is the recorded torque over the recorded error, which friction does not change:
+    with speed y = P·(u - d) and torque u = C·(r - y) the response is y = T·(r - d/C). Zero where
     that torque was not recorded.
     """
     late = _late(s, path, position=position)
@@ -372,7 +376,7 @@ def friction_input(
 def instrument_estimate(
     s: LineSpectra, inputs: list[ComplexArray]
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """S_yr / S_ur with both cross spectra, from the means over periods."""
+    """Return S_yr / S_ur and both cross spectra, from the means over periods."""
     r_mean = [r.mean(axis=0) for r in s.sent]
     pairs = zip(s.response, r_mean, strict=True)
     s_yr = np.asarray(sum(y.mean(axis=0) * r.conj() for y, r in pairs))
@@ -383,7 +387,8 @@ def instrument_estimate(
 def mean_spectra(
     records: tuple[Record, ...],
 ) -> tuple[FloatArray, FloatArray, ComplexArray, ComplexArray]:
-    """Lines in Hz, and cross spectra with the injection of itself, the torque and the velocity.
+    """Return lines in Hz, and the cross spectra of injection, torque and velocity with the
+    injection.
 
     Sums over the records' means; torque as reported, nothing removed from it.
 
@@ -410,7 +415,7 @@ def mean_spectra(
 def loop_spectra(
     records: tuple[Record, ...], path: SignalPath
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Cross spectra with the injection of the loop's own torque and of the velocity, per line."""
+    """Return cross spectra of the loop's own torque and of the velocity with the injection."""
     s = collect(records, path, "torque_injection")
     sent = [r.mean(axis=0).conj() for r in s.sent]
     own = sum(t.mean(axis=0) * r for t, r in zip(s.torque, sent, strict=True))

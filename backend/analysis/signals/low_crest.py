@@ -1,4 +1,4 @@
-"""Phases of a multisine that make its peak small relative to its power.
+"""Phases of a multisine for a low crest factor.
 
 Source: Guillaume et al., IEEE Trans. Instrum. Meas. 40 (1991) 982.
 """
@@ -16,7 +16,7 @@ from backend.analysis.signals.arrays import FloatArray, IntArray
 def low_crest_period(
     n: int, lines: IntArray, amplitude: FloatArray, seed: int, iterations: int
 ) -> FloatArray:
-    """As `_optimised_period`, which searches only once for realisations that share their phases."""
+    """Return `_optimised_period` from a cache, as a copy that the caller may change."""
     whole = (lines.astype(np.int64).tobytes(), amplitude.astype(np.float64).tobytes())
     return _optimised_period(n, *whole, seed, iterations).copy()
 

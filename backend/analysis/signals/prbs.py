@@ -16,7 +16,7 @@ _PRBS_TAPS: dict[int, tuple[int, ...]] = {
 
 
 def prbs_period(order: int, samples_per_bit: int = 1, realisation: int = 0) -> FloatArray:
-    """One period of a maximum-length binary sequence without its mean, peak 1.
+    """Return one period of a maximum-length binary sequence without its mean, peak 1.
 
     Raises:
         ValueError: the order is outside 7 to 15.
@@ -50,9 +50,9 @@ def prbs(
     ramp_samples: int | None = None,
     integrations: int = 0,
 ) -> Excitation:
-    """Maximum-length binary sequence of 2^order - 1 bits, without its mean, peak 1.
+    """Return a maximum-length binary sequence of 2^order - 1 bits, without its mean, peak 1.
 
-    ``realisation`` picks the starting state, that is a cyclic shift. Lines are the bins between
+    ``realisation`` selects the starting state, that is a cyclic shift. Lines are the bins between
     ``f_min_hz`` and ``f_max_hz`` (default 0.4 of the bit rate, where the power is half).
 
     Raises:

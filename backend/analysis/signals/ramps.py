@@ -1,4 +1,4 @@
-"""Ways in and out of an excitation, after which an ideal axis rests where it began."""
+"""Ramps into and out of an excitation, after which an ideal axis is at standstill at its start."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from backend.analysis.signals.arrays import FloatArray
 
 
 def cosine_ramp(n: int) -> FloatArray:
-    """Rises from 0 to 1 within n samples, both ends flat."""
+    """Return a ramp from 0 to 1 over n samples, both ends flat."""
     return 0.5 - 0.5 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
@@ -32,13 +32,13 @@ def settled_ramp(ramp: FloatArray, integrations: int, targets: tuple[float, floa
 def ramped_periods(
     period: FloatArray, periods: int, ramp_samples: int, integrations: int
 ) -> FloatArray:
-    """Ramp in, ``periods`` repetitions, ramp out; the axis ends at standstill where it began."""
+    """Return ramp in, ``periods`` repetitions, ramp out; the axis ends where it began."""
     n = period.size
     if ramp_samples == 0:
         return np.tile(period, periods)
     lead: FloatArray = period[np.arange(-ramp_samples, 0) % n] * cosine_ramp(ramp_samples)
     tail: FloatArray = period[np.arange(ramp_samples) % n] * cosine_ramp(ramp_samples)[::-1]
-    # The steady state the ramp must lead into: zero-mean velocity and position.
+    # The steady state at the end of the ramp in: zero-mean velocity and position.
     velocity: FloatArray = np.cumsum(period)
     velocity -= np.mean(velocity)
     position: FloatArray = np.cumsum(velocity)

@@ -1,8 +1,8 @@
-"""Frequency and damping of the slow mode that rings after a move, from what follows its end.
+"""Frequency and damping of the slow mode that rings after a move, from the ring-down.
 
-Each ring-down is a sum of one damped sinusoid and a parabola, which stands for what creeps
-meanwhile (integral action, friction). Frequency and damping are common to all signals of a
-ring-down, amplitudes and phases are of each (variable projection, Golub and Pereyra 1973).
+Each ring-down is the sum of one damped sinusoid and a parabola for slow creep (integral action,
+friction). Frequency and damping are common to all signals of a ring-down; amplitude and phase are
+individual (variable projection, Golub and Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _CI95 = 1.959964
 
 @dataclass(frozen=True)
 class RingDown:
-    """Signals [n, k] after the end of a move, and whether each sample was seen [n]."""
+    """Signals [n, k] after the end of a move; ``valid`` [n] is True where a sample was received."""
 
     signals: FloatArray
     valid: BoolArray
@@ -31,11 +31,11 @@ class RingDown:
 
 @dataclass(frozen=True)
 class ModeFit:
-    """One ring-down: frequency in Hz, damping ratio, and the deviations of both.
+    """Fit of one ring-down: frequency in Hz, damping ratio, and the deviations of both.
 
-    ``explained`` [k] is the share of each signal about its parabola that the sinusoid is;
+    ``explained`` [k] is the share of each signal, without its parabola, that the sinusoid explains;
     ``amplitude`` [k] is that of the sinusoid at the first sample, ``noise`` [k] the deviation of
-    what is left, both in the unit of the signal.
+    the residual, both in the unit of the signal.
     """
 
     frequency_hz: float
@@ -59,7 +59,7 @@ class Mode:
 
 @dataclass(frozen=True)
 class CommonMode:
-    """The mode that ring-downs agree about, their fits, and the median share that it explains."""
+    """The mode common to several ring-downs, their fits, and the median explained share."""
 
     mode: Mode
     fits: list[ModeFit]
@@ -68,16 +68,17 @@ class CommonMode:
 
 @dataclass(frozen=True)
 class Parts:
-    """A ring-down split at a given mode: its creep [n, k], and the sinusoid's amplitude."""
+    """A ring-down split at a given mode: its creep [n, k], and the amplitude of the sinusoid."""
 
     creep: FloatArray
     amplitude: FloatArray
 
 
 def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
-    """The mode between two frequencies in one ring-down; None where too little was seen.
+    """Return the mode between two frequencies in one ring-down; None where there are too few
+    samples.
 
-    The sinusoid must go through `FEWEST_PERIODS` within what was recorded.
+    The recording must contain at least `FEWEST_PERIODS` of the sinusoid.
     """
     ring = _thinned(ring, high_hz)
     seen, rate = ring.valid, ring.sample_rate_hz
@@ -126,7 +127,7 @@ def fit_mode(ring: RingDown, low_hz: float, high_hz: float) -> ModeFit | None:
 
 
 def common_mode(rings: list[RingDown], low_hz: float, high_hz: float) -> CommonMode | None:
-    """The mode of ring-downs of one signal [n, 1]; None where they do not agree about one."""
+    """Return the mode of ring-downs of one signal [n, 1]; None where they do not agree."""
     fits = [fit_mode(each, low_hz, high_hz) for each in rings]
     good = [each for each in fits if each is not None and _is_mode(each, low_hz, high_hz)]
     if len(good) < max(2, math.ceil(threshold.AGREEING * len(rings))):
@@ -138,7 +139,7 @@ def common_mode(rings: list[RingDown], low_hz: float, high_hz: float) -> CommonM
 
 
 def _is_mode(fit: ModeFit, low_hz: float, high_hz: float) -> bool:
-    """Whether a ring-down is mostly this sinusoid, inside of what was looked at."""
+    """Whether a ring-down consists mostly of this sinusoid, inside the searched band."""
     edge = threshold.EDGE
     inside = low_hz * (1.0 + edge) < fit.frequency_hz < high_hz * (1.0 - edge)
     clear = float(fit.amplitude[0]) > threshold.CLEAR * float(fit.noise[0])
@@ -149,10 +150,10 @@ def _is_mode(fit: ModeFit, low_hz: float, high_hz: float) -> bool:
 def _nearest(
     time: FloatArray, trend: FloatArray, signals: FloatArray, low_hz: float, high_hz: float
 ) -> tuple[float, float]:
-    """Of frequencies and damping ratios on a grid, those that explain most of the signals [n, k].
+    """Grid point of frequency and damping ratio that explains most of the signals [n, k].
 
-    The parabola is projected out of signals and sinusoids alike, so that two unknowns are left,
-    whose normal equations are solved for all of the grid at once.
+    The parabola is projected out of signals and sinusoids alike, which leaves two unknowns, whose
+    normal equations are solved for the whole grid at once.
     """
     steps = max(8, math.ceil(math.log(high_hz / low_hz) / threshold.GRID_STEP))
     frequencies, dampings = (
@@ -175,10 +176,10 @@ def _nearest(
 
 
 def mode_of(fits: list[ModeFit]) -> Mode:
-    """The mean of several ring-downs (at least two), and how certain it is.
+    """Return the mean of several ring-downs (at least two) with its intervals.
 
-    The interval is that of the mean by the scatter between them, and not narrower than what the
-    fits say of themselves.
+    The interval is that of the mean by the scatter between them, and not narrower than the
+    deviations of the fits.
     """
     count = len(fits)
     factor = float(scipy.special.stdtrit(count - 1, 0.975)) if count > 1 else math.inf
@@ -197,7 +198,7 @@ def mode_of(fits: list[ModeFit]) -> Mode:
 
 
 def parts_of(ring: RingDown, mode: Mode) -> Parts:
-    """What creeps and the amplitude [k] of the mode at the first sample, least squares."""
+    """Return the creep, and the amplitude [k] of the mode at the first sample, by least squares."""
     time = np.arange(ring.valid.size) / ring.sample_rate_hz
     base = _base(time, mode.frequency_hz, max(mode.damping, threshold.DAMPING_ENDS[0]))
     solved = _solved(base[ring.valid], ring.signals[ring.valid])
@@ -205,10 +206,10 @@ def parts_of(ring: RingDown, mode: Mode) -> Parts:
 
 
 def about_creep(ring: RingDown, mode: Mode, begin: int) -> FloatArray:
-    """Signals [n, k] without the parabola of what creeps from sample ``begin`` on, smoothed.
+    """Return signals [n, k] without the creep parabola fitted from sample ``begin`` on, smoothed.
 
-    Before that sample the parabola's first value holds. The mean over a tenth of a period takes
-    1.6 % of the mode, and most of the noise of one sample.
+    Before that sample the parabola's first value holds. The mean over a tenth of a period removes
+    1.6 % of the mode, and most of the noise of single samples.
     """
     rate = ring.sample_rate_hz
     creep = parts_of(RingDown(ring.signals[begin:], ring.valid[begin:], rate), mode).creep
@@ -219,9 +220,9 @@ def about_creep(ring: RingDown, mode: Mode, begin: int) -> FloatArray:
 
 
 def settling_s(values: FloatArray, window: float, last: int, rate: float) -> float | None:
-    """Time after which the values [n] stay within ± the window, in s from the first sample.
+    """Return the time after which the values [n] stay within ± the window, s from the first sample.
 
-    None where they are outside of it within the ``last`` samples, which shows no end.
+    None where they are outside the window within the ``last`` samples: they have not settled then.
     """
     outside = np.flatnonzero(np.abs(values) > window)
     if outside.size == 0:
@@ -232,7 +233,7 @@ def settling_s(values: FloatArray, window: float, last: int, rate: float) -> flo
 
 
 def _thinned(ring: RingDown, high_hz: float) -> RingDown:
-    """Means of some samples each: `OVERSAMPLING` of the highest frequency are enough."""
+    """Means over several samples: `OVERSAMPLING` of the highest frequency suffices."""
     step = max(1, math.floor(ring.sample_rate_hz / (threshold.OVERSAMPLING * high_hz)))
     count = ring.valid.size // step
     if step == 1 or count == 0:
@@ -248,7 +249,7 @@ def _trend(time: FloatArray) -> FloatArray:
 
 
 def _base(time: FloatArray, frequency_hz: float, damping: float) -> FloatArray:
-    """Columns: both phases of the sinusoid, and the parabola."""
+    """Columns: cosine and sine of the damped sinusoid, and the parabola."""
     omega = _TURN * frequency_hz
     fall = np.exp(-damping * omega * time)
     angle = omega * math.sqrt(1.0 - damping**2) * time
@@ -260,9 +261,9 @@ def _solved(base: FloatArray, signals: FloatArray) -> FloatArray:
 
 
 def _deviations(jacobian: FloatArray, rest: FloatArray, signals: int) -> FloatArray:
-    """Deviations of log frequency and log damping; what is left is not white.
+    """Deviations of log frequency and log damping for residuals that are not white.
 
-    Its correlation from one sample to the next makes (1 + ρ)/(1 - ρ) samples worth one.
+    With the correlation ρ of neighbouring samples, (1 + ρ)/(1 - ρ) samples count as one.
     """
     table = rest.reshape(-1, signals)
     power = float(np.mean(table**2))

@@ -1,8 +1,8 @@
-"""Input shapers: impulse sequences that a setpoint is convolved with, so that one mode stays quiet.
+"""Input shapers: impulse sequences with which a setpoint is convolved so as not to excite a mode.
 
 ZV and ZVD after Singer and Seering (1990, J. Dyn. Sys. Meas. Control 112, 76-82), EI after
 Singhose, Derezinski and Singer (1996, IEEE ICRA). Amplitudes are shares that sum to one, so that
-a shaped move ends where the other one does.
+a shaped move ends at the same position as the unshaped one.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Shaper:
 
     @property
     def delay_s(self) -> float:
-        """By how much a shaped move ends later."""
+        """Time by which a shaped move ends later, s."""
         return self.times_s[-1]
 
 
@@ -44,11 +44,13 @@ class Band:
 
 
 def design(kind: Kind, frequency_hz: float, damping: float, tolerance: float) -> Shaper:
-    """The shaper of a mode; ``tolerance`` is what an EI shaper leaves at its centre (0.05: 5 %).
+    """Return the shaper of a mode; ``tolerance`` is the residual share of an EI shaper at its
+    centre.
 
-    With K = exp(-ζπ/√(1-ζ²)), the decay within half a period, the impulses of an EI shaper are
-    (1 + VK)/(1 + K)², K² times that, and the rest between them. They leave the share V of the
-    vibration, and are those of Singhose (1 ± V)/4 without damping and of a ZVD with V = 0.
+    With K = exp(-ζπ/√(1-ζ²)), the decay within half a period, the impulses of an EI shaper are (1 +
+    VK)/(1 + K)², K² times that, and the rest between them. They leave the share V (0.05: 5 %) of
+    the vibration, and equal those of Singhose (1 ± V)/4 without damping and those of a ZVD with V =
+    0.
 
     Raises:
         ValueError: frequency, damping or tolerance is not that of an oscillation.
@@ -68,10 +70,10 @@ def design(kind: Kind, frequency_hz: float, damping: float, tolerance: float) ->
 
 
 def residual(shaper: Shaper, frequency_hz: float, damping: float) -> float:
-    """Vibration that is left, as a share of what the same move leaves unshaped at the same time.
+    """Return the residual vibration, as a share of that of the unshaped move at the same time.
 
     It is √(C² + S²) of Singer and Seering. Their V divides by the vibration at time 0 and so
-    counts the decay during the shaper as its merit; this share does not.
+    includes the natural decay during the shaper; this share does not.
     """
     omega = _TURN * frequency_hz
     times, shares = np.asarray(shaper.times_s), np.asarray(shaper.amplitudes)
@@ -80,7 +82,7 @@ def residual(shaper: Shaper, frequency_hz: float, damping: float) -> float:
 
 
 def residual_range(shaper: Shaper, band: Band) -> tuple[float, float]:
-    """The least and the highest residual share of any mode within the band."""
+    """Return the lowest and the highest residual share of any mode within the band."""
     frequencies = np.linspace(*band.frequency_hz, 41)
     dampings = np.linspace(*band.damping, 5)
     left = [residual(shaper, float(f), float(z)) for f, z in product(frequencies, dampings)]
@@ -90,9 +92,9 @@ def residual_range(shaper: Shaper, band: Band) -> tuple[float, float]:
 def tolerated(
     shaper: Shaper, frequency_hz: float, damping: float, tolerance: float
 ) -> tuple[float, float]:
-    """Frequencies in Hz about a mode between which at most this share is left.
+    """Return the frequencies [Hz] about a mode between which at most this share remains.
 
-    Both are the mode's own where the shaper leaves more there already.
+    Both equal the mode's own frequency where the shaper leaves more there already.
     """
     scale = np.geomspace(0.5, 2.0, 1401)
     kept = [residual(shaper, float(frequency_hz * each), damping) for each in scale]
@@ -106,9 +108,10 @@ def tolerated(
 
 
 def shaped(values: FloatArray, shaper: Shaper, sample_rate_hz: float) -> FloatArray:
-    """Setpoints [n] convolved with the shaper, longer by its delay; they hold their last value.
+    """Return setpoints [n] convolved with the shaper, longer by its delay, with the last value
+    held.
 
-    An impulse between two samples is shared among both: at 1 kHz this attenuates 30 Hz by less
+    An impulse between two samples is split between both: at 1 kHz this attenuates 30 Hz by less
     than 0.1 %.
     """
     delays = np.asarray(shaper.times_s) * sample_rate_hz

@@ -21,7 +21,7 @@ class Spectrum:
 def power_density(
     samples: FloatArray, sample_rate_hz: float, segment_samples: int | None = None
 ) -> Spectrum:
-    """Welch's power spectral density, Hann windows with half overlap."""
+    """Return Welch's power spectral density, with Hann windows and half overlap."""
     length = min(samples.size, segment_samples or max(256, samples.size // 8))
     f, value = scipy.signal.welch(samples, sample_rate_hz, nperseg=length)
     return Spectrum(np.asarray(f), np.asarray(value))

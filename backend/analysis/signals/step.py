@@ -1,4 +1,4 @@
-"""Numbers of a commanded step or move."""
+"""Metrics of a commanded step or move."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from backend.analysis.signals.arrays import FloatArray
 
 @dataclass(frozen=True)
 class StepMetrics:
-    """Step response read-outs; times in s from the command, None if never reached.
+    """Metrics of a step response; times in s from the command, None if never reached.
 
-    ``overshoot_percent`` is relative to the step. ``settling_s`` is when the signal enters the
-    window for the last time; None when it is outside at the end of the recording.
+    ``rise_s`` is the time from 10 % to 90 % of the step; ``overshoot_percent`` is relative to the
+    step. ``settling_s`` is when the signal enters the window for the last time; None when it is
+    outside at the end of the recording.
     """
 
     initial: float
@@ -27,7 +28,7 @@ class StepMetrics:
 
 @dataclass(frozen=True)
 class MoveMetrics:
-    """Move read-outs; ``settling_s`` counts from the end of the commanded motion."""
+    """Metrics of a move; ``settling_s`` counts from the end of the commanded motion."""
 
     following_peak: float
     following_rms: float
@@ -68,7 +69,7 @@ def step_metrics(
     initial: float | None = None,
     window: float | None = None,
 ) -> StepMetrics:
-    """Metrics of a step commanded at ``time_s[0]``.
+    """Return the metrics of a step commanded at ``time_s[0]``.
 
     ``initial`` defaults to the first sample, ``window`` (same unit as the signal) to 2 % of the
     step.
@@ -102,7 +103,7 @@ def move_metrics(
     window: float,
     torque: FloatArray | None = None,
 ) -> MoveMetrics:
-    """Metrics of a move: ``demand`` is the commanded position over time, ``window`` its unit."""
+    """Return the metrics of a move: ``demand`` is the position demand, ``window`` in its unit."""
     error = demand - actual
     target = float(demand[-1])
     direction = np.sign(target - float(demand[0])) or 1.0

@@ -1,4 +1,4 @@
-"""One tone after another, for a closer look at a peak."""
+"""Stepped sine: one tone after another, for a detailed measurement of a peak."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def stepped_sine(
     ramp_s: float = 0.02,
     amplitude: FloatArray | None = None,
 ) -> Excitation:
-    """One tone after another, each ramped in and out, for a closer look at a peak.
+    """Return one tone after another, each ramped in and out, for a detailed measurement of a peak.
 
     Every frequency is moved slightly so that its cycles fill a whole number of samples:
-    ``measure_cycles``, or more where these take less than ``measure_s``. ``segments`` say which
-    samples to evaluate. ``amplitude`` weighs the tones; None is 1 for all.
+    ``measure_cycles``, or more where these take less than ``measure_s``. ``segments`` state which
+    samples to evaluate. ``amplitude`` weights the tones; None is 1 for all.
 
     Raises:
-        ValueError: no frequency, or one that cannot be played at this rate.
+        ValueError: no frequency, or one not below half the sample rate.
     """
     weights = np.ones(len(frequency_hz)) if amplitude is None else amplitude
     parts: list[FloatArray] = []

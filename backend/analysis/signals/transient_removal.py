@@ -1,9 +1,9 @@
-"""What still swings from before when the evaluated periods begin, removed from a recording.
+"""Removes free oscillations that have not decayed when the evaluated periods begin.
 
-A hardly damped axis takes longer to settle than anybody wants to wait. Between one period and
-the next all that the excitation causes is the same; what differs is the free swing, a few decaying
-sines. These are found there and continued over all periods (Pintelon & Schoukens, *System
-Identification*, 2012, section 2.2.3 on transients; the decay is the mechanics' own).
+A lightly damped axis takes longer to settle than one wants to wait. From one period to the next the
+forced response is the same; the difference is the free oscillation, a few decaying sines. These are
+identified in the difference and continued over all periods (Pintelon & Schoukens, *System
+Identification*, 2012, section 2.2.3 on transients; the decay is that of the mechanics).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from backend.analysis.thresholds import transient_removal as threshold
 
 @dataclass(frozen=True)
 class _Difference:
-    """Each signal one period later less itself, over all evaluated periods but the last."""
+    """Each signal one period later minus itself, over all evaluated periods but the last."""
 
     series: FloatArray
     """[samples]"""
@@ -30,7 +30,10 @@ class _Difference:
 
 
 def settled(records: tuple[Record, ...]) -> tuple[Record, ...]:
-    """The records without free swings; as they are where periods are missing or nothing swings."""
+    """Return the records without free oscillations.
+
+    A record is unchanged where none is found, or where evaluated periods are missing.
+    """
     poles = _poles(records)
     if poles.size == 0:
         return records
@@ -47,7 +50,7 @@ def _difference(signal: FloatArray, e: Excitation) -> _Difference:
 
 
 def _whole(record: Record) -> bool:
-    """Whether there are two periods or more, all of them good."""
+    """Whether there are at least two evaluated periods, all of them good."""
     e = record.excitation
     if e.segments or e.periods - e.transient_periods < 2:
         return False
@@ -56,7 +59,7 @@ def _whole(record: Record) -> bool:
 
 
 def _poles(records: tuple[Record, ...]) -> ComplexArray:
-    """Logarithms per sample of the decaying swings that the records have in common."""
+    """Logarithms per sample of the decaying oscillations that the records have in common."""
     whole = [record for record in records if _whole(record)]
     if not whole:
         return np.empty(0, dtype=np.complex128)
@@ -102,7 +105,7 @@ def _shape(pole: complex, bins: IntArray, m: int) -> ComplexArray:
 
 
 def _pole_at(spectra: ComplexArray, k: int, m: int) -> complex:
-    """The pole that explains most of the bins around a peak, by two grids, each finer."""
+    """The pole that explains most of the bins around a peak, from successively finer grids."""
     bins = np.arange(max(k - threshold.NEAR, 1), k + threshold.NEAR + 1)
     data = spectra[:, bins]
     place, step, decay, factor = float(k), 0.15, 1.0, 1.5
@@ -120,7 +123,7 @@ def _pole_at(spectra: ComplexArray, k: int, m: int) -> complex:
 
 
 def _without(record: Record, poles: ComplexArray) -> Record:
-    """Every signal less the swings that its own differences show."""
+    """Every signal minus the oscillations found in its own differences."""
     if not _whole(record):
         return record
     e = record.excitation
@@ -134,7 +137,7 @@ def _without(record: Record, poles: ComplexArray) -> Record:
 
 def _cleaned(signal: FloatArray, e: Excitation, poles: ComplexArray) -> FloatArray:
     d = _difference(signal, e)
-    # One sample more: what lies between the last one and the next belongs to the last period.
+    # One more sample: the interval from the last sample to the next belongs to the last period.
     stop = min(d.stop + 1, signal.size)
     n = np.arange(stop - d.start)
     swings = np.exp(poles[None, :] * n[:, None])

@@ -1,1 +1,1 @@
-"""Vibration at constant speeds: sinusoids, orders, level peaks, and a dwell at one frequency."""
+"""Vibration at constant speed: sinusoids, orders, level peaks, and a dwell at one frequency."""

@@ -1,4 +1,4 @@
-"""A dwell at one frequency: what follows the excitation, block by block, and its harmonics."""
+"""Dwell at one frequency: complex response to the excitation per block, with its harmonics."""
 
 from __future__ import annotations
 
@@ -13,29 +13,30 @@ from backend.analysis.thresholds import dwell as threshold
 
 @dataclass(frozen=True)
 class Followed:
-    """Complex amplitudes [blocks, harmonics] of a signal, over the phase of the excitation.
+    """Complex amplitudes [blocks, harmonics] of a signal, with the excitation as phase reference.
 
-    The first harmonic is the frequency of the excitation; ``middle_s`` [blocks] is when.
+    The first harmonic is the excitation frequency; ``middle_s`` [blocks] is the time at the middle
+    of each block, s.
     """
 
     blocks: ComplexArray
     middle_s: FloatArray
 
     def mean(self, harmonic: int = 0) -> complex:
-        """Over all blocks."""
+        """Return the mean over all blocks."""
         return complex(np.mean(self.blocks[:, harmonic]))
 
     def half(self, harmonic: int = 0) -> float:
-        """Half of the 95 % interval of the amplitude, by the scatter between the blocks."""
+        """Return half the 95 % interval of the amplitude, from the scatter between blocks."""
         return self._half(harmonic, 1.0)
 
     def phase_half_deg(self) -> float:
-        """Half of the 95 % interval of the phase, in degrees."""
+        """Return half the 95 % interval of the phase, in degrees."""
         share = self._half(0, 1j) / max(abs(self.mean()), 1e-300)
         return float(np.degrees(np.arcsin(min(share, 1.0))))
 
     def _half(self, harmonic: int, along: complex) -> float:
-        """Of the part along the mean (1), or across it (1j); neighbouring blocks may be alike."""
+        """Half the interval of the part along (1) or across (1j) the mean, blocks correlated."""
         column = self.blocks[:, harmonic]
         if column.size < 3:
             return float("inf")
@@ -49,7 +50,7 @@ class Followed:
         return float(scipy.special.stdtrit(column.size - 1, 0.975) * scatter * wider)
 
     def noise(self, harmonic: int = 0) -> float:
-        """Standard deviation of the mean, both parts together."""
+        """Return the standard deviation of the mean, real and imaginary part together."""
         column = self.blocks[:, harmonic]
         power = float(np.sum(np.abs(column - np.mean(column)) ** 2))
         return float(np.sqrt(power / max(column.size - 1, 1) / max(column.size, 1)))
@@ -63,10 +64,10 @@ def followed(
     first: int,
     harmonics: int,
 ) -> Followed:
-    """Amplitudes in blocks of whole periods; ``first`` is the sample number of ``signal[0]``.
+    """Return the amplitudes in blocks of whole periods.
 
-    By least squares with a polynomial in each block, so that slow motion and lost samples do not
-    count.
+    ``first`` is the sample number of ``signal[0]``. Least squares with a polynomial trend in each
+    block, so that slow motion and lost samples have no influence.
     """
     period = rate_hz / frequency_hz
     periods = max(threshold.PERIODS, int(np.ceil(threshold.BLOCK_S * frequency_hz)))

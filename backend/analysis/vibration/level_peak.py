@@ -1,7 +1,7 @@
-"""Resonances that the levels of orders show: where order times speed meets the same frequency.
+"""Resonances from the levels of orders, found where order times speed meets a fixed frequency.
 
-Each order is a sinusoidal torque whose size does not depend on the speed, or by a power of it; how
-it is answered is common to all orders. About a mode the answer is that of one oscillator.
+Each order is a sinusoidal torque whose amplitude is constant or a power of the speed; the response
+to it is common to all orders. Near a mode that response is the one of a single oscillator.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from backend.analysis.thresholds import level_peak as threshold
 
 @dataclass(frozen=True)
 class LevelPeak:
-    """A mode; ``height`` is its level over what the slope about it would be at its frequency."""
+    """A mode; ``height`` is its level relative to that at the ends of the evaluated window."""
 
     frequency_hz: float
     frequency_ci95_hz: tuple[float, float]
@@ -25,10 +25,10 @@ class LevelPeak:
     height: float
     points: int
     orders: tuple[int, ...]
-    """Numbers of the orders that show it."""
+    """Numbers of the orders used for it."""
 
     def half_level_hz(self) -> tuple[float, float]:
-        """Between these frequencies the level may be more than half of the highest."""
+        """Return the frequencies [Hz] between which the level may exceed half the peak."""
         width = np.sqrt(3.0) * self.damping
         low, high = self.frequency_ci95_hz
         return low * (1.0 - width), high * (1.0 + width)
@@ -36,7 +36,7 @@ class LevelPeak:
 
 @dataclass(frozen=True)
 class _Points:
-    """Log levels [n] at frequencies [n] of orders [n], each with its weight."""
+    """Log levels [n] at frequencies [n] of orders [n], with the weight of each point."""
 
     f: FloatArray
     level: FloatArray
@@ -44,9 +44,10 @@ class _Points:
     order: IntArray
 
     def within(self, low: float, high: float) -> _Points:
-        """Those between two frequencies, of the orders that matter there.
+        """Return the points between two frequencies, of the orders with a significant level there.
 
-        Weak ones are often sidebands of a strong one, and answer at its frequency.
+        Weak orders are often sidebands of a strong one, which respond at the frequency of that
+        order.
         """
         at = (self.f >= low) & (self.f <= high)
         highest = {
@@ -57,7 +58,7 @@ class _Points:
         return _Points(self.f[at], self.level[at], self.weight[at], self.order[at])
 
     def linear(self, centre_hz: float) -> FloatArray:
-        """Columns of each order's size, and of the slope that is common to all."""
+        """Return the columns for the size of each order and for the slope common to all."""
         own = (self.order[:, None] == np.unique(self.order)[None, :]).astype(float)
         return np.column_stack([own, np.log(self.f / centre_hz)])
 
@@ -65,7 +66,7 @@ class _Points:
 def level_peaks(
     frequency_hz: FloatArray, amplitude: FloatArray, deviation: FloatArray, order: IntArray
 ) -> list[LevelPeak]:
-    """Modes, highest first. Arrays [n]: one amplitude of one order at one speed each."""
+    """Return the modes, highest first, from arrays [n]: one amplitude of one order at one speed."""
     good = np.isfinite(amplitude) & (amplitude > 0.0)
     floor = np.maximum(amplitude, deviation)
     relative = np.hypot(deviation[good] / floor[good], threshold.SCATTER)
@@ -90,7 +91,7 @@ def level_peaks(
 
 
 def _clearest(points: _Points, taken: list[float]) -> float | None:
-    """The frequency at which an oscillator explains most, away from those that were tried."""
+    """Frequency at which an oscillator explains most, away from frequencies already tried."""
     grid = np.exp(np.arange(np.log(points.f.min()), np.log(points.f.max()), threshold.STEP))
     best: tuple[float, float] | None = None
     for centre in grid:
@@ -112,7 +113,7 @@ def _clearest(points: _Points, taken: list[float]) -> float | None:
 
 
 def _enough(near: _Points, centre: float) -> bool:
-    """More points than what is fitted, and some on both sides of the frequency."""
+    """Whether there are more points than parameters, with some on both sides of the centre."""
     fitted = np.unique(near.order).size + 3
     below, above = np.count_nonzero(near.f < centre), np.count_nonzero(near.f > centre)
     return bool(
@@ -121,7 +122,7 @@ def _enough(near: _Points, centre: float) -> bool:
 
 
 def _described(points: _Points, about: float) -> LevelPeak | None:
-    """The mode near a frequency, with its interval; None where it is none."""
+    """The mode near a frequency with its interval; None where there is no mode."""
     near = points.within(about / threshold.REACH, about * threshold.REACH)
     across = _Across(near, about)
     # A mode seen from the motor has a zero beside it, near or far.
@@ -151,7 +152,7 @@ def _described(points: _Points, about: float) -> LevelPeak | None:
 
 
 class _Across:
-    """What weighted levels leave that sizes of orders and a common slope do not explain."""
+    """Residuals of weighted levels after fitting the orders' sizes and a common slope."""
 
     def __init__(self, near: _Points, centre: float) -> None:
         linear = near.linear(centre)
@@ -160,35 +161,35 @@ class _Across:
         self._q, _ = np.linalg.qr(near.weight[:, None] * linear)
 
     def rest(self, shape: FloatArray | float) -> FloatArray:
-        """[n] of levels without this shape."""
+        """Return the residuals [n] of the levels less this shape."""
         weighted = self._near.weight * (self._near.level - shape)
         return np.asarray(weighted - self._q @ (self._q.T @ weighted))
 
     def rss(self, shape: FloatArray | float) -> float:
-        """Sum of the squares of it."""
+        """Return the sum of squares of these residuals."""
         rest = self.rest(shape)
         return float(rest @ rest)
 
 
 @dataclass(frozen=True)
 class _Solved:
-    """Logarithms of frequency and damping of the mode, and of its zero."""
+    """``parameters``: logarithms of frequency and damping of the mode, and of its zero."""
 
     parameters: FloatArray
     rss: float
     jacobian: FloatArray
 
     def deviation(self, free: int) -> float:
-        """Standard deviation of the logarithm of the frequency, by the scatter of the points.
+        """Return the standard deviation of log frequency, from the scatter of the points.
 
-        Never less than what the points are weighted by.
+        It is never less than the weights of the points imply.
         """
         covariance = np.linalg.pinv(self.jacobian.T @ self.jacobian)
         return float(np.sqrt(covariance[0, 0] * max(self.rss / free, 1.0)))
 
 
 def _solved(near: _Points, across: _Across, about: float, zero: float) -> _Solved:
-    """The best mode about a frequency; its zero begins at this share of the frequency."""
+    """Fit the best mode near a frequency; its zero starts at ``zero`` times that frequency."""
 
     def left(p: FloatArray) -> FloatArray:
         f, z, zero_f, zero_z = (float(v) for v in np.exp(p))
@@ -206,15 +207,15 @@ def _solved(near: _Points, across: _Across, about: float, zero: float) -> _Solve
 
 
 def _oscillator(f: FloatArray, frequency: float, damping: float) -> FloatArray:
-    """Logarithm of the level of an oscillator [n], but for its size."""
+    """Logarithm of the level of an oscillator [n], up to its size."""
     away = f / frequency - frequency / f
     return np.asarray(-0.5 * np.log(away**2 + (2.0 * damping) ** 2))
 
 
 def _peaked(near: _Points, frequency: float, damping: float) -> bool:
-    """Whether an order has points on the peak itself, and falls on both sides of it.
+    """Whether an order has points on the peak itself and falls on both sides of it.
 
-    A peak between two points is none that was seen.
+    A peak that lies between two points has not been observed.
     """
     away = np.abs(near.f / frequency - frequency / near.f)
     on = away < threshold.ON_PEAK * damping
@@ -230,7 +231,7 @@ def _peaked(near: _Points, frequency: float, damping: float) -> bool:
 
 
 def _height(frequency: float, damping: float, near: _Points) -> float:
-    """Level at the mode over that at the ends of the window, by the oscillator alone."""
+    """Level at the mode relative to that at the ends of the window, of the oscillator alone."""
     ends = np.array([near.f.min(), near.f.max()])
     away = np.abs(ends / frequency - frequency / ends)
     return float(np.min(np.hypot(away, 2.0 * damping)) / (2.0 * damping))

@@ -1,8 +1,8 @@
-"""Which components repeat by the angle (orders) and which by the time, seen over many speeds.
+"""Separates components that repeat per revolution (orders) from those that repeat in time.
 
-At one constant speed both are alike. Over several speeds an order keeps its number of periods per
-revolution, and a frequency its hertz; a component above half the sample rate is folded and keeps
-neither.
+At one constant speed both look the same. Over several speeds an order keeps its number of periods
+per revolution, and a frequency its value in Hz; a component above half the sample rate is folded
+and keeps neither.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Kind = Literal["order", "frequency"]
 
 @dataclass(frozen=True)
 class Seen:
-    """One sinusoid of one segment; ``speed`` numbers the speeds of the ladder."""
+    """One sinusoid of one segment; ``speed`` is the index of the speed in the series of speeds."""
 
     segment: int
     speed: int
@@ -34,7 +34,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Component:
-    """What is the same at several speeds: an order per revolution, or a frequency in Hz."""
+    """A component common to several speeds: an order per revolution, or a frequency in Hz."""
 
     kind: Kind
     value: float
@@ -45,7 +45,7 @@ class Component:
 
 
 def components(seen: Sequence[Seen]) -> tuple[list[Component], list[Seen]]:
-    """Those of most speeds first, and the sinusoids that belong to none."""
+    """Return the components, those seen at most speeds first, and the sinusoids of none."""
     left, found = list(seen), list[Component]()
     while True:
         best: tuple[tuple[int, float], Kind, list[Seen]] | None = None
@@ -67,10 +67,10 @@ def components(seen: Sequence[Seen]) -> tuple[list[Component], list[Seen]]:
 def levels(
     segments: Sequence[Segment], found: Sequence[Component], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Amplitudes of speed [segments, components], their deviations, and those of torque.
+    """Return amplitudes of speed [segments, components], their deviations, and those of torque.
 
-    Not a number where a component is outside the band, has too few periods, or cannot be
-    distinguished from another one. Where an order meets a frequency, the level is the order's.
+    NaN where a component is outside the band, has too few periods, or cannot be separated from
+    another one. Where an order meets a frequency, the level is assigned to the order.
     """
     shape = len(segments), len(found)
     speed, deviation, torque = (np.full(shape, np.nan) for _ in range(3))
@@ -124,13 +124,13 @@ def _deviation(one: Seen, kind: Kind) -> float:
 
 
 def _tolerance(one: Seen, kind: Kind) -> float:
-    """How far it may lie from the others: its deviation, and a share of a line."""
+    """Permitted distance from the others: multiple of its deviation, and a share of a line."""
     line = 1.0 / one.turns if kind == "order" else one.speed_rps / one.turns
     return threshold.DEVIATIONS * _deviation(one, kind) + threshold.OF_LINE * line
 
 
 def _largest(left: Sequence[Seen], kind: Kind) -> list[Seen] | None:
-    """The group of most speeds about one value; None where no group has enough."""
+    """The group about one value with most speeds; None where no group has enough."""
     if not left:
         return None
     value = np.array([_value(one, kind) for one in left])
@@ -141,7 +141,7 @@ def _largest(left: Sequence[Seen], kind: Kind) -> list[Seen] | None:
     best: tuple[tuple[int, float], IntArray] | None = None
     for centre in range(len(left)):
         near = np.flatnonzero(np.abs(value - value[centre]) <= np.hypot(reach, reach[centre]))
-        # One of each segment, the strongest.
+        # Keep the strongest sinusoid of each segment.
         near = near[np.argsort(-strength[near])]
         near = near[np.unique(segment[near], return_index=True)[1]]
         score = int(np.unique(speed[near]).size), float(np.sum(strength[near]))
@@ -156,7 +156,7 @@ def _largest(left: Sequence[Seen], kind: Kind) -> list[Seen] | None:
 
 
 def _component(kind: Kind, group: Sequence[Seen]) -> Component:
-    """Mean with its interval; what the values scatter beyond their deviations counts, too."""
+    """Mean with its interval, which includes scatter of the values beyond their deviations."""
     value = np.array([_value(one, kind) for one in group])
     variance = np.array([_deviation(one, kind) ** 2 for one in group])
     weight = 1.0 / np.maximum(variance, 1e-24)

@@ -1,7 +1,7 @@
-"""The sinusoids in a recording of one constant speed, by time or by angle, with lost samples.
+"""Sinusoids in a recording at one constant speed, in time or in angle, with lost samples.
 
-One after the other is found in the spectrum of what the others leave, and all are fitted together:
-gaps and neighbours then leak into nothing.
+They are found one after the other in the spectrum of the residual, and all are fitted together, so
+that gaps and neighbouring components cause no leakage.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from backend.analysis.thresholds import sinusoids as threshold
 
 @dataclass(frozen=True)
 class Segment:
-    """One constant speed; arrays [n], ``turns`` grow and are 0 at the beginning.
+    """One constant speed; arrays [n], ``turns`` [rev] increase from 0.
 
-    ``speed`` and ``torque`` are about their trend, in units of their own; ``valid`` is False where
-    a sample was lost.
+    ``speed`` and ``torque`` are without their trend, in their own units; ``valid`` is False where a
+    sample was lost.
     """
 
     rate_hz: float
@@ -31,16 +31,16 @@ class Segment:
 
     @property
     def duration_s(self) -> float:
-        """Time that it lasts."""
+        """Duration of the segment."""
         return self.turns.size / self.rate_hz
 
     @property
     def speed_rps(self) -> float:
-        """Mean speed."""
+        """Mean speed, revolutions per second."""
         return float(self.turns[-1] - self.turns[0]) / ((self.turns.size - 1) / self.rate_hz)
 
     def clock(self, *, by_angle: bool) -> FloatArray:
-        """Time [n] in s, or turns over the mean speed, in which a constant order is a frequency."""
+        """Return time [n] in s, or turns over mean speed, in which an order is a frequency."""
         if by_angle:
             return np.asarray((self.turns - self.turns[0]) / self.speed_rps)
         return np.arange(self.turns.size) / self.rate_hz
@@ -50,7 +50,7 @@ class Segment:
 class Sinusoid:
     """One component of the speed; deviations are standard deviations.
 
-    ``by_angle``: it repeats by the angle at least as well as by the time.
+    ``by_angle``: it repeats per angle at least as well as in time.
     """
 
     frequency_hz: float
@@ -61,14 +61,14 @@ class Sinusoid:
 
 
 def about_trend(signal: FloatArray, valid: BoolArray) -> FloatArray:
-    """Without mean, drift and its change [n], by the samples that came."""
+    """Return the signal [n] without mean, slope and curvature, fitted to the valid samples."""
     place = np.linspace(-1.0, 1.0, signal.size)
     fit = np.polynomial.polynomial.polyfit(place[valid], signal[valid], 2)
     return np.asarray(signal - np.polynomial.polynomial.polyval(place, fit), np.float64)
 
 
 def sinusoids(segment: Segment, low_hz: float, high_hz: float) -> list[Sinusoid]:
-    """Those that stand out of the noise around them, strongest first as they were found."""
+    """Return the sinusoids that exceed the noise around them, in descending order of amplitude."""
     found: list[tuple[float, bool]] = []
     clocks = {way: segment.clock(by_angle=way) for way in (True, False)}
     rest = segment.speed * segment.valid
@@ -77,7 +77,7 @@ def sinusoids(segment: Segment, low_hz: float, high_hz: float) -> list[Sinusoid]
         best: tuple[float, float, bool] | None = None
         for by_angle, clock in clocks.items():
             ratio, frequency = _strongest(rest * window, clock, segment, low_hz, high_hz)
-            # Equally good: by angle, since what turns with the shaft is the rule.
+            # On a tie take the angle: most components turn with the shaft.
             if best is None or ratio > 1.02 * best[0]:
                 best = ratio, frequency, by_angle
         assert best is not None
@@ -110,7 +110,7 @@ def sinusoids(segment: Segment, low_hz: float, high_hz: float) -> list[Sinusoid]
 
 
 def _together(segment: Segment, components: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
-    """The same with the frequencies that fit best together, without a window."""
+    """Refine the frequencies of all components together, without a window."""
     used, line = segment.valid.astype(float), 1.0 / segment.duration_s
     for _ in range(threshold.TOGETHER):
         amplitudes, _ = fitted(segment, segment.speed, components)
@@ -130,13 +130,13 @@ def _together(segment: Segment, components: list[tuple[float, bool]]) -> list[tu
 def fitted(
     segment: Segment, signal: FloatArray, components: list[tuple[float, bool]]
 ) -> tuple[ComplexArray, FloatArray]:
-    """Complex amplitudes [k] of these (frequency in Hz, by angle), and the deviation of each.
+    """Return complex amplitudes [k] of these (frequency in Hz, by angle), and their deviations.
 
     The deviation is that of the noise around each frequency, which is seldom white.
     """
     columns = _columns(segment, components)
     valid = segment.valid
-    # By normal equations: columns of different frequencies are nearly at right angles.
+    # Normal equations suffice: columns of different frequencies are nearly orthogonal.
     used = columns * valid[:, None]
     solved = np.linalg.lstsq(used.T @ used, used.T @ signal, rcond=None)[0]
     k = len(components)
@@ -165,7 +165,7 @@ def _sum(
 
 
 def _noise(power: FloatArray) -> FloatArray:
-    """Mean power [lines] of the noise, by the median of the lines around."""
+    """Mean power [lines] of the noise, from the median of the neighbouring lines."""
     width = min(threshold.AROUND, power.size)
     middle = scipy.ndimage.median_filter(power, width, mode="nearest")
     return np.asarray(np.maximum(middle / np.log(2.0), 1e-300))
@@ -174,9 +174,9 @@ def _noise(power: FloatArray) -> FloatArray:
 def _strongest(
     signal: FloatArray, clock: FloatArray, segment: Segment, low_hz: float, high_hz: float
 ) -> tuple[float, float]:
-    """Highest ratio to the noise around, and its frequency; ``clock`` may run unevenly."""
+    """Highest ratio to the noise around it, and its frequency; ``clock`` may be uneven."""
     even = np.linspace(clock[0], clock[-1], clock.size)
-    # Interpolated on an even grid only to find it; it is fitted by the samples themselves.
+    # Interpolated on an even grid for the search only; the fit uses the samples themselves.
     warped = np.interp(even, clock, signal) if np.max(np.abs(even - clock)) > 1e-6 else signal
     size = 2 * warped.size
     power = np.abs(np.fft.rfft(warped, size)) ** 2
