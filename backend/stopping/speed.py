@@ -141,6 +141,9 @@ class SpeedWatch:
         if now is None:
             return None
         both = [self._by_position(now), self._by_velocity(now)]
+        if both[1] is not None and self.units is not None and not self.certain:
+            # Increments per second are no speed to be compared with the drive's own.
+            both = both[1:]
         return max((value for value in both if value is not None), default=None)
 
     def slows(self, over_s: float = 0.25) -> bool:

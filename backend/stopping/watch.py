@@ -297,11 +297,14 @@ class StopWatch:
         try:
             if halted and sample.state is State.OPERATION_ENABLED and axis.cyclic_power() is None:
                 await axis.control(cia402.QUICK_STOP)
-            if before is not None:
-                await axis.drive.stop_by(OPTION, before)
-                axis.option_before = None
-                figures = {"raw": float(before)}
-                axis.stop_step(StepCode.OPTION_RESTORED, None, OPTION, figures)
+        except DriveError as error:
+            axis.stop_step(StepCode.QUICK_STOP, error.text)
+        if before is None:
+            return
+        try:
+            await axis.drive.stop_by(OPTION, before)
+            axis.option_before = None
+            axis.stop_step(StepCode.OPTION_RESTORED, None, OPTION, {"raw": float(before)})
         except DriveError as error:
             axis.stop_step(StepCode.OPTION_RESTORED, error.text, OPTION)
 

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import Connection, TheBench
+from backend.api.errors import NotFound
 from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
 from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
 from backend.audit.asked import note_before
@@ -22,7 +23,9 @@ from drivers.ethercat.eeprom.image import MOST_BYTES, Difference, Image, differe
 from drivers.ethercat.eeprom.plan import Plan
 from drivers.ethercat.link import EthercatLink
 from drivers.texts.message import Text, language, text
-from profiles.loader import load_profile
+from drivers.texts.profile_errors import profile_error_text
+from profiles.loader import ProfileError, load_profile
+from profiles.schema import Profile
 
 router = APIRouter()
 
@@ -46,6 +49,15 @@ Size = Annotated[
 UnknownAccepted = Annotated[
     bool, Query(description="the file is of this drive although the drive cannot say what it is")
 ]
+
+
+def _imported(name: str) -> Profile:
+    try:
+        return load_profile(name)
+    except ProfileError as error:
+        raise NotFound(
+            profile_error_text(error), value=name, remedy="api-station.see-profiles"
+        ) from error
 
 
 @router.get("/ethercat/eeprom", response_class=Response)

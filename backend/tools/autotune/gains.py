@@ -18,6 +18,7 @@ from backend.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from backend.tools.thresholds import autotune_gains as threshold
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 from profiles.schema import GainSpec, StiffnessTable
 
 TURN = 2 * np.pi
@@ -202,10 +203,9 @@ def plan_filters(drive: Drive, filters: LoopFilters) -> dict[str, int]:
     return {key: _within(drive, key, value) for key, value in raw.items()}
 
 
-def _by_hand(drive: Drive) -> str:
+def _by_hand(drive: Drive) -> Text:
     """Advice for manual tuning where nothing can be computed."""
-    what = "choose its stiffness level" if _table(drive) else "change its gains in small steps"
-    return f"{what} on the Tune or Parameters page, and look at a step after each change"
+    return text("autotune.by-level" if _table(drive) else "autotune.by-gains")
 
 
 def _inertia_raw(

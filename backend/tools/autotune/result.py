@@ -116,10 +116,13 @@ class VerdictInfo(_Part):
 
 
 class GainStepInfo(_Part):
-    """One raised gain and the oscillation of the torque in % of the rated torque (RMS)."""
+    """One raised gain and the oscillation of the torque in % of the rated torque (RMS).
+
+    ``oscillation_percent`` is None where the drive ended the step, for example by a fault.
+    """
 
     gain_db: float
-    oscillation_percent: float
+    oscillation_percent: float | None
     stable: bool
 
 

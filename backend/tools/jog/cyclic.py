@@ -70,7 +70,9 @@ def signal(settings: GeneratorSettings, cycle_s: float) -> Signal:
             max_s=threshold.MAX_S,
         )
     nyquist = 0.5 / cycle_s
-    highest = max(settings.frequency_hz, settings.frequency_end_hz)
+    highest = settings.frequency_hz
+    if settings.shape == "chirp":
+        highest = max(highest, settings.frequency_end_hz)
     if settings.shape in ("sine", "chirp") and not 0 < highest < nyquist / 2:
         raise OutOfRange(
             "jog.hz-cannot-played-cycle",

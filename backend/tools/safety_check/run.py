@@ -39,9 +39,12 @@ from drivers import link as bus
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.halt import HaltCause
+from drivers.texts import limits
 from drivers.texts.message import Text, text
 
 FloatArray = npt.NDArray[np.float64]
+#: Column of the status word in the rows of the exchange.
+STATUS = 4
 #: Time without power before, for the noise of the torque; duration of a ramp; of the end [s].
 _LEAD_S, _RAMP_S, _END_S = 0.3, 0.4, 0.3
 #: A sign is a speed below this share of the commanded one in this many successive rows.
@@ -78,7 +81,24 @@ class _Catch:
             good = np.ones(len(part), np.bool_) if block.valid is None else block.valid
             rows = slice((block.cycle or 0) - first, (block.cycle or 0) - first + len(part))
             table[rows], valid[rows] = part, good & ~np.isnan(part).any(axis=1)
-        return first, bridged(table, valid), valid
+        states = held(table[:, STATUS], valid)
+        table = bridged(table, valid)
+        # Between two status words lies no third one, and its bits could show any state.
+        table[:, STATUS] = states
+        return first, table, valid
+
+
+def held(words: FloatArray, valid: npt.NDArray[np.bool_]) -> FloatArray:
+    """Status words [n], each row that is not ``valid`` [n] with the last valid word before it.
+
+    Rows before the first valid one have that one.
+    """
+    if not np.any(valid):
+        return words
+    rows = np.where(valid, np.arange(len(words)), -1)
+    last = np.maximum.accumulate(rows)
+    last[last < 0] = int(np.flatnonzero(valid)[0])
+    return np.asarray(words[last])
 
 
 async def run(run: Run, settings: SafetySettings) -> SafetyResult:
@@ -98,6 +118,15 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
     require_signals(axis, session, Mode.CSV, False)
     _require_status(run)
     plan = plan_of(settings, rate, await brake_opens_s(drive))
+    raw_per_rpm = units.velocity_raw(1e6) / 1e6
+    raw = np.round(plan * raw_per_rpm).astype(np.int64)
+    if not np.any(raw):
+        raise OutOfRange(
+            "safety-check.below-resolution",
+            drive=drive.name,
+            value=settings.speed_rpm,
+            limit=limits.at_least(1.0 / raw_per_rpm, "rpm"),
+        )
     facts = await read_facts(axis, settings.rated_torque_nm)
     person = settings.person or acting_person()
     settings = settings.model_copy(update={"person": person})
@@ -118,7 +147,6 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
         watch = _Watch(plan, settings, rate, catch, units)
         try:
             async with enabled(axis, session, Mode.CSV) as start:
-                raw = np.round(plan * (units.velocity_raw(1e6) / 1e6)).astype(np.int64)
                 await play(
                     axis,
                     session,
@@ -294,9 +322,9 @@ def _trace(
     lead = int(np.flatnonzero(raw)[0])
     known = plan[lead : lead + len(table) - begun]
     commanded[begun : begun + known.size] = known
-    words = {int(word): axis.drive.decode_state(int(word)) for word in np.unique(table[:, 4])}
+    words = {int(w): axis.drive.decode_state(int(w)) for w in np.unique(table[:, STATUS])}
     position = np.unwrap(table[:, 0], period=2.0**32)
-    states = np.array([words[int(word)].value for word in table[:, 4]])
+    states = np.array([words[int(word)].value for word in table[:, STATUS]])
     return Trace(
         position_rev=position * units.position(1.0), speed_rpm=table[:, 1] * units.velocity(1.0),
         torque_percent=table[:, 2] * units.torque(1.0), commanded_rpm=commanded,

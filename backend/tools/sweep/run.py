@@ -118,9 +118,10 @@ async def sweep(
         )  # fmt: skip
 
     async def back() -> None:
-        await go_back(axis, session, home, settings.envelope, facts)
+        # First of all, so that the measurement is not lost if the way back fails.
         if keep is not None:
             keep(f"sweep-{settings.kind}", *raw_of(records, setup, settings, dc=_dc(session)))
+        await go_back(axis, session, home, settings.envelope, facts)
 
     try:
         return await meanwhile(evaluated, back())

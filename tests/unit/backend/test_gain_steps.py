@@ -15,7 +15,9 @@ import pytest
 import scipy
 
 from backend.axis.axis import Envelope
-from backend.tools.autotune.gain_steps import GainStep, judged
+from backend.tools.autotune.gain_steps import GainStep, GainSteps, judged
+from backend.tools.autotune.result import GainStepsInfo
+from backend.tools.measuring.figures import figures_of
 from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
 
 FloatArray = npt.NDArray[np.float64]
@@ -186,3 +188,10 @@ def test_noise_that_rises_with_the_gain_is_seldom_an_oscillation() -> None:
         alarms = sum(not shown(raised, now).stable for now, raised in pairs)
         # Ten of 400 would be 2.5 %.
         assert alarms <= 2
+
+
+def test_a_step_that_the_drive_ended_is_part_of_the_result() -> None:
+    ended = GainSteps(6.0, 9.0, (GainStep(6.0, 0.4, True), GainStep(9.0, float("inf"), False)))
+    shown = GainStepsInfo.model_validate(figures_of(ended))
+    assert [each.oscillation_percent for each in shown.steps] == [0.4, None]
+    assert shown.onset_db == 9.0

@@ -64,6 +64,14 @@ def test_the_position_may_begin_anew() -> None:
     assert found.travelled_inc == pytest.approx(4 * COUNTS, rel=0.01)
 
 
+def test_a_speed_in_rpm_is_not_compared_with_increments_per_second() -> None:
+    """300 rpm of an encoder whose resolution is not known: 50 000 inc/s are no 50 000 rpm."""
+    found = watch(AxisUnits(UnitSpec(velocity="rpm"), None))
+    feed(found, 300.0, 300)
+    assert found.turns
+    assert found.speed() == pytest.approx(300.0)
+
+
 # --- turning without a reason ----------------------------------------------------------
 
 

@@ -1,3 +1,5 @@
+safety-check_below-resolution = { $drive }: the drive's unit of speed is coarser than the test speed
+    .remedy = choose a higher test speed
 safety-check_enabled = { $drive } is enabled already
     .remedy = disable the axis first
 safety-check_no-limited-speed = the test speed must be at least 20 % above the speed limit, so that the record shows whether the limit acts

@@ -1,3 +1,5 @@
+safety-check_below-resolution = { $drive }：测试速度小于驱动器速度的最小单位
+    .remedy = 请选择更高的测试速度
 safety-check_enabled = { $drive } 已使能
     .remedy = 请先断使能该轴
 safety-check_no-limited-speed = 测试速度必须比速度限值至少高 20 %，这样记录才能表明限速是否起作用
