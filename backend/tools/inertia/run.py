@@ -119,7 +119,8 @@ async def inertia(
                 recording, result = again, calm
         await back_to(home)
     if keep is not None:
-        keep("inertia", *raw_of(recording, settings, facts))
+        # With the ends that were found, so that an evaluation of the file states them too.
+        keep("inertia", *raw_of(recording, replace(settings, ends_rev=ends), facts))
     return InertiaOutcome(
         result,
         f"host, {settings.scheme}",
