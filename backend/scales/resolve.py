@@ -269,7 +269,7 @@ _MULTIPLE = re.compile(r"(?:(0?\.\d+|1|10|100)\s*)?(rpm|r/min|rpm/s|inc/s|inc/sÂ
 def by_text(
     quantity: Quantity, text: str, per_rev: float | None, origin: Origin, spec: UnitSpec
 ) -> Scale:
-    """Scale from a unit as a profile states it: ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``, ``ms``."""
+    """Scale from a unit text of a profile: ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``, ``ms``."""
     text = text.strip()
     if quantity is Quantity.ACCELERATION and text.startswith("ms"):
         # A ramp time to a reference speed is not a factor; `AxisUnits` converts it.
