@@ -1,4 +1,4 @@
-"""Restore lists on the disk, as a server or command that is killed in a motion restores nothing.
+"""Restore lists on the disk, as a server or command killed in a motion restores nothing.
 
 One small file per drive in the state folder while values are changed or pending, none otherwise.
 It is written before the first temporary value changes; the motion waits for the disk then, but no

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: A fault that needs no motion and that a reset clears.
 TRAINING_FAULT = "under_voltage"
-#: Number of scans of a bus until all of its drives have answered.
+#: Largest number of scans of a bus until all of its drives have answered.
 _TRIES = 10
 #: Pause between scans [s]: on a busy computer the segment answers late after its start.
 _PAUSE_S = 1.0

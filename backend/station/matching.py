@@ -46,7 +46,7 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
             why = text("station.match-name", name=found.name)
             matches.append(Match(profile, "likely", why))
         else:
-            # The name of the maker is missing: in the drive, or already in its manual.
+            # The vendor ID is unknown: the manual states none, or the drive does not report it.
             silent = "manual" if identity.vendor_id is None else "drive"
             matches.append(
                 Match(profile, "possible", text("station.match-bus", bus=kind, silent=silent))

@@ -17,8 +17,9 @@ from drivers.texts.message import text
 
 #: Time limit for ending an exchange and starting again the one that had to be stopped [s].
 EXCHANGE_ENDS_S = 60.0
-#: Time limit for starting an exchange for a measurement [s]. Pages and programs wait 30 s for the
-#: answer; where a segment stops answering meanwhile, ending the exchange takes up to 15 s more.
+#: Time limit for starting an exchange for a measurement [s]. Its request is then answered within
+#: the 30 s that pages and programs wait, even where a segment stops answering meanwhile and ending
+#: the exchange takes 15 s more.
 SET_UP_S = 14.0
 
 
