@@ -1,4 +1,4 @@
-"""The audit trail: who did what to which axis, in a chain that shows any later change."""
+"""The audit trail: who did what to which axis, in a hash chain that reveals any later change."""
 
 from backend.audit.facts import Fact
 from backend.audit.log import AuditLog

@@ -1,4 +1,4 @@
-"""What a request or message asks for, so that the audit shows it without every route's help."""
+"""Settings of the current request or message, recorded in the audit without code in every route."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from contextvars import ContextVar
 
 from backend.audit.facts import Value
 
-#: Larger bodies are files; their names are in the path.
+#: Largest body that is recorded; larger ones are files, whose names are in the path.
 MOST_BYTES = 8192
 _MAX_TEXT = 300
-#: Never in the audit.
+#: Fields that are never recorded in the audit.
 _SECRET = frozenset({"password", "present", "code", "secret", "link", "token"})
 
 
 class Asked:
-    """One request. ``fields`` gives what it says when it is needed; ``before`` what was there."""
+    """One request. ``fields`` returns its fields when needed; ``before``: the replaced values."""
 
     def __init__(self, fields: Callable[[], Mapping[str, object]]) -> None:
         self._fields = fields
@@ -24,7 +24,7 @@ class Asked:
 
     @property
     def settings(self) -> dict[str, Value]:
-        """Everything asked for but secrets: bare values as they are, others as short JSON."""
+        """All fields but secrets: plain values as they are, others as shortened JSON."""
         return {
             key: _bare(value)
             for key, value in self._fields().items()
@@ -33,12 +33,12 @@ class Asked:
 
     @property
     def old(self) -> str | None:
-        """What was there before as text, None where nobody said."""
+        """The replaced values as text; None where they were not recorded."""
         return _text(self.before) if self.before else None
 
     @property
     def new(self) -> str | None:
-        """What is asked for as text, None for nothing."""
+        """The requested settings as text; None without any."""
         settings = self.settings
         return _text(settings) if settings else None
 
@@ -48,19 +48,19 @@ asked: ContextVar[Asked | None] = ContextVar("asked", default=None)
 
 
 def settings_now() -> dict[str, Value]:
-    """What is asked for at present."""
+    """Settings of the current request; empty without one."""
     now = asked.get()
     return {} if now is None else now.settings
 
 
 def note_before(**values: object) -> None:
-    """Report to the audit what a change replaces."""
+    """Record for the audit the values that a change replaces."""
     if (now := asked.get()) is not None:
         now.before = values
 
 
 def fields_of(body: bytes) -> Mapping[str, object]:
-    """Fields of a JSON body; nothing where it is none."""
+    """Fields of a JSON body; empty where it is not a JSON object."""
     try:
         content = json.loads(body) if body else None
     except (ValueError, RecursionError):

@@ -1,8 +1,8 @@
-"""The chain: each entry's hash covers its text and the hash before it.
+"""The hash chain: each entry's hash covers its text and the hash of the entry before it.
 
-Changing, removing, inserting or reordering entries breaks it at the first entry concerned. Who
-can rewrite the whole database can compute a new chain; against that serves an anchor, a number
-and hash noted elsewhere (a printed report, a colleague's mail).
+Changing, removing, inserting or reordering entries breaks the chain at the first entry concerned.
+Whoever can rewrite the whole database can compute a new chain. An anchor protects against that: a
+number and hash recorded elsewhere (a printed report, an e-mail).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from sqlalchemy.orm import Session
 from backend.store.audit_tables import AuditEntry, AuditHead
 from drivers.texts.message import Text, text
 
-#: What stands for the hash before the first entry.
+#: Value used as the hash before the first entry.
 ZERO = "0" * 64
-#: Parts of the body that are columns too, and how long the column is.
+#: Parts of the body that are columns as well, with the column's length.
 COLUMNS = {"time": 32, "station": 100, "person": 200, "kind": 30, "axis": 200, "target": 300}
 
 
@@ -37,7 +37,7 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """Outcome of a check. ``broken`` is the first wrong entry's number, None where all is well."""
+    """Outcome of a check. ``broken``: number of the first wrong entry; None without any."""
 
     entries: int
     head: Anchor
@@ -46,17 +46,17 @@ class Verdict:
 
     @property
     def ok(self) -> bool:
-        """Whether the chain is whole."""
+        """Whether the chain is intact."""
         return self.broken is None
 
 
 def link(previous: str, body: str) -> str:
-    """Hash of an entry: SHA-256 of the hash before it (as text) and its body, in UTF-8."""
+    """Hash of an entry: SHA-256 of the preceding hash (as text) and its body, in UTF-8."""
     return hashlib.sha256(previous.encode("ascii") + body.encode()).hexdigest()
 
 
 def append(session: Session, bodies: Sequence[str]) -> Anchor:
-    """Add entries; the head is locked until the transaction ends, so that writers queue up."""
+    """Add entries; the head is locked until the transaction ends, which serialises writers."""
     head = session.execute(
         select(AuditHead).where(AuditHead.id == 1).with_for_update()
     ).scalar_one()

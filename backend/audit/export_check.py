@@ -11,10 +11,10 @@ from drivers.errors import NotAllowed
 
 
 def check_lines(lines: Iterable[str], anchor: Anchor | None = None) -> Verdict:
-    """Check lines as `Trail.export` writes them; whether the end is missing only an anchor shows.
+    """Check lines as written by `Trail.export`; a missing end is detected only with an anchor.
 
     Raises:
-        NotAllowed: a line is no entry of an audit.
+        NotAllowed: a line is not an entry of an audit.
     """
     entries = list(_entries(lines))
     last = entries[-1] if entries else None

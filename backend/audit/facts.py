@@ -1,4 +1,4 @@
-"""What the audit keeps of one event, and its form as text that is hashed."""
+"""Data of one event of the audit, and its text form, which is hashed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Action = Literal[
     "token revoked", "joined", "granted", "grant withdrawn", "ended", "motion enabled",
     "motion ended", "asks", "gives", "keeps", "hands over", "overrides", "lost",
 ]  # fmt: skip
-"""What was done; entries keep this word, and the page has its text for it."""
+"""Kind of action; stored in entries, and shown as text by the page."""
 
 Value = int | float | str | bool | None
 _MAX_TEXT = 2000
@@ -36,12 +36,12 @@ _MAX_TEXT = 2000
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One event. ``person`` is filled in from who is acting where it is None.
+    """One event. Where ``person`` is None, the acting person is used.
 
-    ``target`` is what it was done to (a parameter's key, a file's name, a person), ``old`` and
-    ``new`` are raw values, ``outcome`` is what went wrong, None for success, ``title`` what a job
-    was called and ``reason`` why a motion by hand ended. An entry keeps messages as code and facts,
-    and in English for whoever searches or reads it without a catalogue.
+    ``target``: object of the action (a parameter's key, a file's name, a person). ``old``, ``new``:
+    raw values. ``outcome``: what went wrong, None for success. ``title``: title of a job.
+    ``reason``: why a manual motion ended. An entry stores messages as code and parameters, and also
+    in English for searching and for reading without the catalogue.
     """
 
     kind: Kind
@@ -84,19 +84,19 @@ def body_of(fact: Fact, *, moment: datetime, station: str, person: str) -> str:
 
 
 def stamp(moment: datetime) -> str:
-    """ISO 8601 in UTC with microseconds and Z: sorts as text."""
+    """Time as ISO 8601 in UTC with microseconds and Z, which sorts as text."""
     return moment.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
 
 
 def _wire(value: object) -> object:
-    """A message as plain values, each of which JSON and both databases hold."""
+    """A message as plain values that JSON and both databases can store."""
     if isinstance(value, dict):
         return {str(name): _wire(each) for name, each in value.items()}
     return _plain(value) if isinstance(value, (int, float, str)) else value
 
 
 def _plain(value: Value) -> Value:
-    """A value that JSON and both databases hold: no NaN, no NUL, no half characters, no novels."""
+    """A value that JSON and both databases can store: no NaN, NUL or surrogates, limited length."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     if isinstance(value, str):

@@ -1,10 +1,10 @@
-"""Writing the audit without ever keeping anybody waiting who must not wait.
+"""Writing the audit without blocking its callers.
 
-`AuditLog.add` puts an event into a queue and returns: STOP, motion and every other caller go on.
-A thread appends to the database. While that fails (disk full, server away) events wait in memory
-and, where the state folder can be written, in ``audit-pending.jsonl``, which a later start takes
-up; `AuditLog.problem` says so on every page. `AuditLog.settled` lets an answer wait, for a
-bounded time, until what it reports is safely recorded.
+`AuditLog.add` puts an event into a queue and returns, so that STOP, motion and every other caller
+continue. A thread appends to the database. While that fails (disk full, server unreachable) events
+wait in memory and, where the state folder can be written, in ``audit-pending.jsonl``, which a later
+start reads; every page shows `AuditLog.problem`. `AuditLog.settled` delays an answer, for a limited
+time, until the events it reports are safely recorded.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from drivers.texts.message import Text, text
 
 log = logging.getLogger(__name__)
 
-#: Who acts when nobody does.
+#: Acting person of events without a person.
 PROGRAM = "servodeck"
 _BATCH = 500
 _RETRY_S = (0.5, 1.0, 2.0, 5.0)
@@ -41,9 +41,10 @@ _RETRY_S = (0.5, 1.0, 2.0, 5.0)
 
 @dataclass(slots=True)
 class _Queue:
-    """Events that are not in the database. ``spooled`` of them, the first ones, are in the file.
+    """Events that are not in the database yet.
 
-    ``lost`` counts those that found no room; ``kept`` all that ever got a safe place.
+    ``spooled``: number of the first ones that are in the file. ``lost``: number of events dropped
+    because the queue was full. ``kept``: number of all events so far that are on a disk.
     """
 
     bodies: deque[str] = field(default_factory=deque)
@@ -56,10 +57,10 @@ class _Queue:
 
 
 class AuditLog:
-    """The audit of one station. Nothing is touched before the first event, or `start`.
+    """The audit of one station. It opens nothing before the first event, or `start`.
 
-    ``changed`` is called on the writing thread with a new problem, or with None when it is
-    over.
+    ``changed`` is called on the writing thread with a new problem, or with None when the problem
+    is over.
     """
 
     def __init__(
@@ -80,16 +81,16 @@ class AuditLog:
         self._thread: threading.Thread | None = None
         self._closing = False
         self._file_takes = True
-        #: Bodies of transactions that failed: those may have been committed all the same.
+        #: Bodies of failed transactions, which may have been committed nevertheless.
         self._unsure: set[str] = set()
         self._last_time = datetime.min.replace(tzinfo=UTC)
         self.problem: Text | None = None
-        """Why events are not in the database yet; None while all is well."""
+        """Why events are not in the database yet; None without a problem."""
 
     # --- adding -----------------------------------------------------------------------
 
     def add(self, fact: Fact) -> None:
-        """Record an event as of now. Never waits and never fails."""
+        """Record an event with the present time. Never waits and never fails."""
         person = fact.person if fact.person is not None else acting_person() or PROGRAM
         with self._wake:
             if self._closing:
@@ -110,7 +111,7 @@ class AuditLog:
             self._wake.notify()
 
     async def settled(self, timeout_s: float) -> bool:
-        """Wait until all events so far are safe on a disk; False when that takes longer."""
+        """Wait until all events so far are on a disk; False where that takes longer."""
         with self._wake:
             queue = self._queue
             if queue.kept >= queue.added:
@@ -126,17 +127,17 @@ class AuditLog:
 
     @property
     def pending(self) -> int:
-        """Events that are not in the database yet."""
+        """Number of events that are not in the database yet."""
         with self._wake:
             return len(self._queue.bodies)
 
     def start(self) -> None:
-        """Take up what an earlier run could not write."""
+        """Start the writing thread, which first writes the events of an earlier run."""
         with self._wake:
             self._start()
 
     def close(self, timeout_s: float = 5.0) -> None:
-        """Write what is left, to the database or else to the file, and end. Blocks."""
+        """Write the remaining events, to the database or otherwise to the file, and end. Blocks."""
         with self._wake:
             self._closing = True
             self._wake.notify()
@@ -148,7 +149,7 @@ class AuditLog:
 
     def _start(self) -> None:
         if self._thread is None and not self._closing:
-            # A daemon: a database that hangs must not keep the program from ending.
+            # A daemon, as a database that hangs must not prevent the program from ending.
             self._thread = threading.Thread(target=self._run, name="audit", daemon=True)
             self._thread.start()
 
@@ -192,7 +193,7 @@ class AuditLog:
         self._unsure.update(earlier)
 
     def _ready(self, retry_at: float) -> bool:
-        """Whether there is something to do now: for the database, or else for the file."""
+        """Whether there is something to write now, to the database or otherwise to the file."""
         queue = self._queue
         if not queue.bodies:
             return False
@@ -201,7 +202,7 @@ class AuditLog:
         )
 
     def _append(self, bodies: list[str]) -> None:
-        """Add to the chain, leaving out what a transaction of unknown outcome already added."""
+        """Add to the chain, without entries that a transaction of unknown outcome has added."""
         with self._store.writing() as session:
             uncertain = [body for body in bodies if body in self._unsure]
             if uncertain:
@@ -257,10 +258,10 @@ class AuditLog:
             self._changed(why)
 
     def _spool(self) -> None:
-        """Put into the file what is only in memory; where that fails, memory has to do."""
+        """Append events that are only in memory to the file; on failure they stay in memory."""
         with self._wake:
             fresh = list(islice(self._queue.bodies, self._queue.spooled, None))
-        # From the file another process of this station may write them to the database.
+        # Another process of this station may write them from the file to the database.
         self._unsure.update(fresh)
         taken = not fresh or self._file.append(fresh)
         with self._wake:

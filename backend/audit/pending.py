@@ -1,4 +1,4 @@
-"""Events that wait for the database, as lines of a file. A line that was cut off is left out."""
+"""Events that wait for the database, as lines of a file. A truncated line is left out."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pathlib import Path
 
 
 class PendingFile:
-    """Appended to and flushed to the disk; deleted when everything in it is in the database."""
+    """The file of waiting events; flushed after every append, deleted once they are stored."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def read(self) -> list[str]:
-        """Whole lines of an earlier run; what follows the last line feed was cut off, and goes."""
+        """Complete lines of an earlier run; a rest after the last line feed is truncated."""
         try:
             data = self._path.read_bytes()
             whole = data.rfind(b"\n") + 1
@@ -26,7 +26,7 @@ class PendingFile:
         return [text for line in data[:whole].splitlines() if (text := _body(line))]
 
     def append(self, bodies: list[str]) -> bool:
-        """Add lines; False where the disk does not take them."""
+        """Append lines; False where they cannot be written."""
         data = "".join(f"{body}\n" for body in bodies).encode()
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -42,7 +42,7 @@ class PendingFile:
         return whole
 
     def clear(self) -> None:
-        """Forget all; what cannot be deleted is recognised later as written already."""
+        """Delete the file; if that fails, its events are later recognised as written already."""
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""What happens on the bench, as the audit shows it. Each kind of event enters in one place."""
+"""Audit recorder: converts events of the bench to audit facts, each kind in one method."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from drivers.errors import why_of
 from drivers.texts.answers import message_in
 from drivers.texts.message import Text, text
 
-#: Jobs that only read what the pages show anyway.
+#: Jobs that are not recorded, as they only read values that the pages show anyway.
 _UNREMARKABLE = frozenset({"reread", "read_all"})
 _KINDS: dict[str, Kind] = {"procedure": "procedure", "load_set": "job", "put-back": "job"}
 
 
 @dataclass(slots=True)
 class _Sent:
-    """Commands of one parameter while something moves: how many, the first and the last."""
+    """Commands of one parameter during a motion: their number, the first and the last."""
 
     first: int
     last: int
@@ -37,30 +37,30 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Running:
-    """A job whose begin was recorded, with the axes that it moves."""
+    """A job whose beginning was recorded, with the axes that it moves."""
 
     drives: tuple[str, ...]
     sent: dict[str, _Sent] = field(default_factory=dict)
 
 
 class AuditRecorder:
-    """Listens to drives, jobs and leases. ``name_of`` gives an axis's name for its id."""
+    """Records events of drives, jobs and leases. ``name_of`` returns the name of an axis id."""
 
     def __init__(self, audit: AuditLog, name_of: Callable[[str], str]) -> None:
         self._audit = audit
         self._name_of = name_of
         self._holders: dict[str, str] = {}
         self._running: dict[str, _Running] = {}
-        #: By drive and parameter the last command that no motion had sent.
+        #: Last command outside of a motion, by drive and parameter.
         self._commanded: dict[tuple[str, str], tuple[int, Text | None]] = {}
 
     def wrote(self, record: WriteRecord) -> None:
-        """A parameter was written, or may have been."""
+        """Record a write of a parameter, also one whose outcome is unknown."""
         detail: dict[str, Value] = {"drive": record.drive, "parameter": record.parameter}
         new = record.after
         if record.after is None or record.after != record.wanted:
             detail["wanted"] = record.wanted
-        # What a person gave for a setting that can start a motion.
+        # The reason that a person gave for a setting that can start a motion.
         if isinstance(reason := settings_now().get("reason"), str) and reason:
             detail["reason"] = reason
         outcome = record.problem
@@ -80,7 +80,7 @@ class AuditRecorder:
         )
 
     def refused(self, refusal: Refusal) -> None:
-        """Somebody tried to move an axis by a parameter."""
+        """Record a refused write of a parameter that can move the axis."""
         detail: dict[str, Value] = {"drive": refusal.drive, "wanted": refusal.wanted}
         self._audit.add(
             Fact(
@@ -94,10 +94,10 @@ class AuditRecorder:
         )
 
     def commanded(self, record: CommandRecord) -> None:
-        """A control word or setpoint was sent, or may have been.
+        """Record a control word or setpoint, also one whose outcome is unknown.
 
-        What a motion sends, many a second, is recorded with its end. All else is recorded at once,
-        and again only when it changes: words that STOP repeats are one event.
+        The many commands of a motion are recorded together at its end. Others are recorded at once,
+        and again only when they change, so that control words repeated by STOP are one event.
         """
         motion = next((j for j in self._running.values() if record.drive in j.drives), None)
         if motion is not None:
@@ -127,7 +127,7 @@ class AuditRecorder:
         )
 
     def job_changed(self, job: Job) -> None:
-        """A job began or ended; progress between is not kept."""
+        """Record the beginning or end of a job; its progress is not recorded."""
         if job.kind in _UNREMARKABLE:
             return
         detail: dict[str, Value] = {}
@@ -161,12 +161,12 @@ class AuditRecorder:
         )
 
     def _forget_commands(self, drives: Sequence[str | None]) -> None:
-        """A motion has commanded since; what comes next is new, whatever it was before."""
+        """Discard the last commands of these drives, as a motion has sent others since."""
         for place in [place for place in self._commanded if place[0] in drives]:
             del self._commanded[place]
 
     def lease_changed(self, drive: str, holder: Holder | None) -> None:
-        """Control of an axis may have changed hands."""
+        """Record a change of the person who controls an axis."""
         before, now = self._holders.get(drive, ""), holder.person if holder else ""
         if before == now:
             return
@@ -185,7 +185,7 @@ class AuditRecorder:
         )
 
     def stopped(self, drives: Sequence[str]) -> None:
-        """Somebody pressed STOP. Reported when it is sent: nothing waits for this."""
+        """Record that STOP was pressed; called when STOP is sent, which does not wait for it."""
         for drive in drives:
             self._audit.add(
                 Fact("stop", "pressed", axis=self._name_of(drive), detail={"drive": drive})
@@ -193,7 +193,7 @@ class AuditRecorder:
 
 
 def _outcome(job: Job) -> Text | None:
-    """Why a job did not come to its end; None where it runs or is done."""
+    """Why a job failed or was cancelled; None where it runs or is done."""
     if job.error is not None:
         return why_of(job.error)
     return job.cancel_cause if job.state == "cancelled" else None

@@ -1,4 +1,4 @@
-"""Reading the audit: search, export, check. All of it blocks and belongs on a thread."""
+"""Reading the audit: search, export, check. All functions block and must run on a thread."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _ESCAPE = "\\"
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """What to show; empty means all. ``words`` must all occur, in whatever case."""
+    """Conditions of a search; empty fields do not restrict it. All ``words`` must occur."""
 
     kinds: tuple[str, ...] = ()
     person: str = ""
@@ -60,7 +60,7 @@ class Filter:
 
 
 def like(text: str) -> str:
-    """Text in which LIKE's own signs stand for themselves."""
+    """Text with the special characters of LIKE escaped."""
     for sign in (_ESCAPE, "%", "_"):
         text = text.replace(sign, _ESCAPE + sign)
     return text
@@ -87,7 +87,7 @@ class Event:
     detail: dict[str, Value]
 
     def detail_in(self, language: Language) -> dict[str, Value]:
-        """Its details; the title of a job, and why a motion by hand ended, in this language."""
+        """Its details; a job's title and the reason for a motion's end in this language."""
         messages = {"title": self.title, "reason": self.reason}
         return self.detail | {
             name: each.words(language) for name, each in messages.items() if each is not None
@@ -101,10 +101,10 @@ class Trail:
         self._store = store
 
     def search(self, wanted: Filter, *, before: int | None = None, limit: int = 200) -> list[Event]:
-        """Events, newest first; ``before`` is the number of the last one already shown.
+        """Events, newest first; ``before``: number of the last one already shown.
 
         Raises:
-            DatabaseFailed: the database.
+            DatabaseFailed: an error of the database.
         """
         query = wanted.apply(select(AuditEntry)).order_by(AuditEntry.number.desc()).limit(limit)
         if before is not None:
@@ -113,7 +113,7 @@ class Trail:
             return [_event(entry) for entry in session.scalars(query)]
 
     def names(self) -> dict[str, list[str]]:
-        """What can be chosen in a filter: the persons, axes and stations that occur."""
+        """Choices for a filter: the persons, axes and stations that occur."""
         columns = {
             "person": AuditEntry.person,
             "axis": AuditEntry.axis,
@@ -126,12 +126,13 @@ class Trail:
             }
 
     def export(self, wanted: Filter, form: Format, language: Language = "en") -> Iterator[str]:
-        """Lines, oldest first. JSON lines carry body, number and both hashes, so that a chain
-        exported as a whole can be checked without the database; a table has its sentences in this
-        language.
+        """Lines of an export, oldest first.
+
+        JSON lines contain body, number and both hashes, so that a chain exported as a whole can be
+        checked without the database. A CSV table has its texts in ``language``.
 
         Raises:
-            DatabaseFailed: the database.
+            DatabaseFailed: an error of the database.
         """
         if form == "csv":
             yield _csv_line(_CSV)
@@ -139,7 +140,7 @@ class Trail:
         while True:
             query = wanted.apply(select(AuditEntry)).where(AuditEntry.number > last)
             query = query.order_by(AuditEntry.number).limit(_CHUNK)
-            # A transaction for each chunk: a slow reader must not hold one open.
+            # One transaction per chunk, as a slow reader must not hold one open.
             with self._store.reading() as session:
                 entries = list(session.scalars(query))
             for entry in entries:
@@ -152,7 +153,7 @@ class Trail:
         """Number and hash of the last entry.
 
         Raises:
-            DatabaseFailed: the database.
+            DatabaseFailed: an error of the database.
         """
         with self._store.reading() as session:
             return _head(session) or Anchor(0, "")
@@ -161,7 +162,7 @@ class Trail:
         """Check the whole chain in one consistent view of the database.
 
         Raises:
-            DatabaseFailed: the database.
+            DatabaseFailed: an error of the database.
         """
         query = select(AuditEntry).order_by(AuditEntry.number)
         with self._store.reading(snapshot=True) as session:
@@ -198,7 +199,7 @@ def _event(entry: AuditEntry) -> Event:
 
 
 def _message(content: Mapping[str, Any], name: str, words: object) -> Text | None:
-    """A message of an entry; the words alone of an entry that was made before there were codes."""
+    """A message of an entry; only its text for entries from before messages had codes."""
     found = content.get("messages", {}).get(name)
     if found is not None:
         return Text.from_wire(found)

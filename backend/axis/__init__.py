@@ -1,1 +1,1 @@
-"""One axis: power state, modes, units, gearing, process data, and the contexts that restore it."""
+"""One axis: power state, modes, units, gearing, process data, and restoring after a motion."""

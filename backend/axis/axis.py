@@ -1,7 +1,7 @@
-"""One axis: its units, and the two context managers that carry safety.
+"""One axis: motion permission, and the two context managers that its safety rests on.
 
-`Axis.restoring` puts parameters back and `Axis.enabled` leaves Operation enabled, on every way
-out. Their cleanup is shielded from cancellation, has a deadline, and reports what it left.
+`Axis.restoring` restores parameters and `Axis.enabled` leaves Operation enabled, on every exit.
+Their cleanup is shielded from cancellation, has a deadline, and reports what it could not restore.
 """
 
 from __future__ import annotations
@@ -37,11 +37,12 @@ class Axis(ScaledAxis):
 
     def __init__(self, drive: Drive) -> None:
         super().__init__(drive)
-        #: A person enabled it by a transition, and nobody took that back here.
+        #: A person enabled the axis by a transition and has not disabled it here since.
         self._left_enabled = False
-        #: Time for a brake that opens by itself after enabling, once a motion met it closed [s].
+        #: Time to wait after enabling for a brake that the drive releases itself [s]; 0 until a
+        #: motion has found the brake still applied.
         self.brake_wait_s = 0.0
-        #: The page by which it was left enabled; None where it was no page.
+        #: Connection of the page that left the axis enabled; None where it was not a page.
         self.enabled_by: str | None = None
         self._standing: Grant | None = None
         #: Called with the reason when the axis must not stay enabled; power must be switched off.
@@ -49,11 +50,11 @@ class Axis(ScaledAxis):
 
     @property
     def left_enabled(self) -> bool:
-        """A person enabled it by a transition, and nobody took that back."""
+        """Whether a person left the axis enabled by a transition and STOP was not pressed since."""
         return self._left_enabled and not self.stopped
 
     def forget(self) -> None:
-        """The drive restarted or its gearing changed."""
+        """Discard scales and control word, as the drive restarted or its gearing changed."""
         self.forget_scales()
         self.control_word = 0
 
@@ -69,30 +70,32 @@ class Axis(ScaledAxis):
         """Change power state and, where given, the mode, without moving.
 
         Raises:
-            NotAllowed: the drive stays where it is, or STOP was pressed meanwhile.
+            NotAllowed: the drive does not change its state, or STOP was pressed meanwhile.
         """
         await self.require_stop_delivered()
-        # In a running exchange the loop keeps the setpoints where the axis is.
+        # In a running exchange the loop keeps the setpoints at the actual position.
         aims = self.cyclic_power() is None
         with self.granted(f"to “{goal.value}”"):
             if mode is not None:
                 if aims:
-                    # One that is enabled already would follow a stale setpoint of the new mode.
+                    # An axis that is enabled already would follow a stale setpoint of the new mode.
                     await self.aim_here(mode)
                 await self.set_mode(mode)
             if goal is State.OPERATION_ENABLED and aims:
                 await self.aim_here()
-            # Noted before the word goes out: whatever happens on the way, it may be enabled then.
+            # Recorded before the control word is sent: from then on the axis may be enabled,
+            # even where an error follows.
             self._leave_enabled(goal is State.OPERATION_ENABLED)
             await self.go_to(goal)
 
     def _leave_enabled(self, enabled: bool) -> None:
-        """A person leaves the axis enabled from here on, or does so no longer."""
+        """Record whether a person leaves the axis enabled, and begin or end the standing grant."""
         actor = acting.get()
         self._left_enabled = enabled
         self.enabled_by = actor.connection if enabled and actor is not None else None
         if enabled:
-            # A page is watched, and its end takes the power off; a script has no sign of life.
+            # A page's connection is supervised, and its end switches the power off; a script gives
+            # no sign of life, so its grant has a time limit.
             lasts_s = math.inf if self.enabled_by is not None else UNATTENDED_S
             drive = self.drive
             self._standing = drive.authority.standing(
@@ -103,12 +106,12 @@ class Axis(ScaledAxis):
             self._standing = None
 
     async def let_go(self) -> None:
-        """Take the power off an axis that a person enabled here and left enabled.
+        """Switch off the power of an axis that a person enabled here and left enabled.
 
-        For when nobody looks after it any more: the server ends, or the axis leaves the bench.
+        Used where nobody attends the axis any more: the server ends, or the axis is removed.
 
         Raises:
-            DriveError: the drive does not take it.
+            DriveError: the power could not be switched off.
         """
         if not self._left_enabled:
             return
@@ -126,7 +129,7 @@ class Axis(ScaledAxis):
         """Halt (bit 8) and wait for standstill; quick stop if the axis does not slow down.
 
         Raises:
-            LinkTimeout: not at standstill in time even so; the message says what to do.
+            LinkTimeout: no standstill in time, even by quick stop; the message contains a remedy.
         """
         await self.control(cia402.ENABLE_OPERATION | cia402.HALT)
         if await self.standstill(timeout_s):
@@ -135,7 +138,7 @@ class Axis(ScaledAxis):
         await self._require_rest(timeout_s)
 
     async def _require_rest(self, timeout_s: float) -> None:
-        """Raises LinkTimeout when the axis still moves after a quick stop."""
+        """Raise LinkTimeout where the axis still moves after a quick stop."""
         if not await self.standstill(timeout_s):
             raise LinkTimeout(
                 "axis.still-moves-after-quick", drive=self.drive.name, timeout_s=timeout_s
@@ -144,7 +147,8 @@ class Axis(ScaledAxis):
     async def standstill(self, timeout_s: float) -> bool:
         """Whether the axis stopped (position unchanged over 30 ms) within the time.
 
-        Two readings are compared at least: a busy computer or a slow bus may take longer for one.
+        At least two readings are compared, even where one of them takes longer than the timeout on
+        a busy computer or a slow bus.
         """
         tolerance = (await self.units()).rest_tolerance()
         deadline = time.monotonic() + timeout_s
@@ -158,13 +162,13 @@ class Axis(ScaledAxis):
                 return False
             last = now
 
-    # --- what must be undone ----------------------------------------------------------
+    # --- what must be restored --------------------------------------------------------
 
     def restoring(self, *keys: str) -> AbstractAsyncContextManager[dict[str, Raw]]:
-        """Put these parameters back to what they are now, on every exit.
+        """Restore these parameters to their present values on every exit.
 
         Raises:
-            RestoreFailed: on leaving, naming what could not be restored.
+            RestoreFailed: on exit; the message names what could not be restored.
         """
         return restoring.restoring(self.drive, *keys)
 
@@ -172,13 +176,12 @@ class Axis(ScaledAxis):
     async def enabled(self, mode: Mode, envelope: Envelope) -> AsyncIterator[None]:
         """Operation enabled in ``mode`` with the drive's torque limited by ``envelope``.
 
-        STOP brakes at least as hard meanwhile as the profile's deceleration that was set before.
-
-        On leaving, the axis is stopped, and back to the power state and mode it was
-        in. The mode is set before enabling, at standstill, as some families demand.
+        Meanwhile STOP brakes at least as hard as the profile deceleration (6084h) that was set
+        before. On exit the axis is stopped and returned to its earlier power state and mode. The
+        mode is set before enabling, at standstill, as some families require.
 
         Raises:
-            NotAllowed: the axis cannot be enabled, with the cause.
+            NotAllowed: the axis cannot be enabled; the message contains the cause.
         """
         drive = self.drive
         if self.cyclic_power() is not None:
@@ -203,8 +206,8 @@ class Axis(ScaledAxis):
             previous = Mode(int(shown)) if shown in set(Mode) else mode
             await self.limit_torque(limits, envelope.torque_percent)
             await raise_quick_stop(drive, earlier)
-            # A stale setpoint must not start to move the axis: neither at the change of mode,
-            # where it is enabled already, nor when it is enabled.
+            # A stale setpoint must not move the axis: neither at the change of mode, where the axis
+            # is enabled already, nor when it is enabled.
             await self.aim_here(mode)
             await self.set_mode(mode)
             await self.aim_here(mode)
@@ -227,15 +230,15 @@ class Axis(ScaledAxis):
     async def enabled_cyclic(
         self, session: CyclicSession, mode: Mode, timeout_s: float, *, by_increments: bool = False
     ) -> AsyncIterator[None]:
-        """Operation enabled through the loop; braked and disabled on every way out.
+        """Operation enabled through the cyclic loop; the axis is braked and disabled on every exit.
 
-        ``by_increments`` is for the small move that teaches a scale; every other motion needs
-        scales that are certain.
+        ``by_increments`` is for the small move by which a scale is determined; every other motion
+        needs scales that are certain.
 
         Raises:
-            ScaleUnknown: they are not.
-            NotAllowed: it cannot be enabled, the loop ended the motion, or the drive has a fault
-                at its end. Where the drive has a fault, the message names it.
+            ScaleUnknown: a scale is not certain.
+            NotAllowed: the axis cannot be enabled, the loop ended the motion, or the drive has a
+                fault at its end. Where the drive has a fault, the message names it.
         """
         if not by_increments:
             await self.require_planned_scales()
@@ -253,14 +256,20 @@ class Axis(ScaledAxis):
             await self._require_sound()
 
     async def _require_sound(self) -> None:
-        """A fault after the last look at the motion must not pass for a motion that went well."""
+        """Raise NotAllowed where the drive has a fault now.
+
+        A fault after the last check of the motion must not be taken for a motion without error.
+        """
         if await self.state() in (State.FAULT, State.FAULT_REACTION):
             error = NotAllowed("axis.fault-end-motion", drive=self.drive.name)
             await self._name_fault(error)
             raise error
 
     async def _name_fault(self, error: NotAllowed) -> None:
-        """The loop sees only that the drive left Operation enabled; the drive has the reason."""
+        """Add the drive's active faults to an error of the loop.
+
+        The loop only knows that the drive left Operation enabled; the drive reports the reason.
+        """
         try:
             if await self.state() not in (State.FAULT, State.FAULT_REACTION):
                 return
@@ -272,10 +281,10 @@ class Axis(ScaledAxis):
             error.names_faults = True
 
     async def leave_cyclic(self, session: CyclicSession, timeout_s: float) -> None:
-        """Brake and take the power off through the loop; nothing interrupts this.
+        """Brake and switch the power off through the loop, shielded from cancellation.
 
         Raises:
-            DriveError: the loop does not do it. A stop is pending then: what moves is not known.
+            DriveError: the loop did not do so. A stop is pending then, as the axis may still move.
         """
         try:
             await shielded(lambda: self._leave_cyclic(session), timeout_s, self.drive.name)
@@ -285,7 +294,8 @@ class Axis(ScaledAxis):
 
     async def _leave_cyclic(self, session: CyclicSession) -> None:
         if not session.running:
-            # Ended in order it has braked everything; broken off it has left that to the drive.
+            # An exchange that was stopped has braked all axes; one that broke off has left braking
+            # to the drive.
             self.stop_pending = self.stop_pending or bool(session.trouble)
             return
         await session.cyclic.halt(session.station(self.drive))
@@ -294,7 +304,7 @@ class Axis(ScaledAxis):
             await self.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, timeout_s=5.0)
 
     async def restorable_mode(self) -> list[str]:
-        """The mode's key, unless the drive shows one that cannot be written (none, at power-on)."""
+        """Key of 6060h; none where the drive shows a mode that cannot be written (power-on)."""
         key = self.drive.key("mode")
         if key is None:
             return []
@@ -305,7 +315,7 @@ class Axis(ScaledAxis):
         return [key]
 
     async def limit_torque(self, limits: list[str], percent: float) -> None:
-        """Lower these limits of the drive to ``percent`` of rated torque; none is raised."""
+        """Lower these torque limits to ``percent`` of rated torque; lower limits stay unchanged."""
         units = await self.units()
         for key in limits:
             parameter = self.drive.parameter(key)
@@ -319,11 +329,14 @@ class Axis(ScaledAxis):
             if current > raw:
                 await self.drive.write(key, raw)
             elif current < -raw:
-                # Families that keep the limit of negative torque as a negative number.
+                # Some families hold the limit of negative torque as a negative number.
                 await self.drive.write(key, -raw)
 
     async def aim_here(self, mode: Mode | None = None) -> None:
-        """Setpoint to "stay": of ``mode``, or of the mode that the drive shows."""
+        """Write the setpoint with which the axis stays where it is.
+
+        It is the setpoint of ``mode``, or of the mode that the drive shows.
+        """
         drive = self.drive
         if mode is None:
             display = drive.key("mode_display")
@@ -341,16 +354,16 @@ class Axis(ScaledAxis):
             await drive.command(key, value, self.grant(key))
 
     def _may_move(self) -> bool:
-        """Neither STOP was pressed nor the permission of this work has ended."""
+        """Whether STOP was not pressed and the grant of this work has not ended."""
         return not self.stopped and self.drive.authority.may_move(self.drive.id)
 
     async def _leave(self, before: State, mode: Mode, previous: Mode) -> None:
-        """To rest, and to the power state of before; without permission, to Switch on disabled."""
+        """Stop and return to the power state ``before``; without a grant, to Switch on disabled."""
         if self._may_move():
             try:
                 await self._leave_as_before(before, mode, previous)
             except NotAllowed:
-                # STOP or the end of the permission refuses the words that are still to come.
+                # After STOP or the end of the grant, further control words are refused.
                 if self._may_move():
                     raise
             else:
@@ -358,7 +371,7 @@ class Axis(ScaledAxis):
                     return
         state = await self.state()
         if state is State.OPERATION_ENABLED:
-            # The write of STOP itself is still under way, or was lost.
+            # The quick stop that STOP sent is still under way, or was lost.
             await self.quick_stop()
         if state in (State.FAULT, State.FAULT_REACTION):
             return
@@ -372,8 +385,8 @@ class Axis(ScaledAxis):
             await self.halt_and_wait(CLEANUP_TIMEOUT_S / 2)
             state = await self.state()
         if before is State.OPERATION_ENABLED and state is State.OPERATION_ENABLED:
-            # Halt is released only onto a setpoint that is where the axis is, in this
-            # mode and in the one that comes back.
+            # Halt is released only after the setpoint is at the actual position, in this mode
+            # and in the mode that is restored.
             for aimed in dict.fromkeys((mode, previous)):
                 await self.aim_here(aimed)
             if mode is Mode.PP:

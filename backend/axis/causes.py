@@ -1,7 +1,7 @@
-"""What may keep an axis from being enabled in addition to what its status word says: for a refusal.
+"""Possible causes of a refused enable that the status word does not show.
 
-These are hints from what the drive reports at this moment. They are read only after a change
-of state was refused, when a person looks for the reason.
+They are hints from what the drive reports at this moment, and are read only after a change of
+state was refused, when a person looks for the reason.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from backend.drive.terminals import read_terminals
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
 
-#: Words in the names of input functions that stop an axis (tables of the manuals' DI functions).
+#: Words in the names of input functions that stop an axis (tables of DI functions in the manuals).
 _STOPPING = ("emergency stop", "external fault", "signal stop")
 _POSITIVE_LIMIT, _NEGATIVE_LIMIT = 1, 0
 
@@ -20,7 +20,7 @@ _POSITIVE_LIMIT, _NEGATIVE_LIMIT = 1, 0
 async def hints(drive: Drive) -> list[Text]:
     """Inputs that stop the axis, limit switches that are on, and a mode that is not set.
 
-    What cannot be read is left out: this explains another error.
+    Values that cannot be read are left out, as the hints only explain another error.
     """
     found: list[Text] = []
     try:
@@ -33,7 +33,7 @@ async def hints(drive: Drive) -> list[Text]:
 
 
 async def _terminals(drive: Drive) -> list[Text]:
-    """Active inputs whose function stops the axis or must be on for it to be enabled."""
+    """Active inputs whose function stops the axis."""
     return [
         text("axis.cause-input", terminal=state.terminal.name, function=state.function_name)
         for state in await read_terminals(drive)
@@ -44,7 +44,7 @@ async def _terminals(drive: Drive) -> list[Text]:
 
 
 async def _limits(drive: Drive) -> list[Text]:
-    """Limit switches that are on (60FDh, CiA 402-2; some families exchange the bits)."""
+    """Limit switches that are on (60FDh, CiA 402-2; some families have the bits swapped)."""
     key = drive.key("digital_inputs")
     if key is None:
         return []
@@ -59,7 +59,7 @@ async def _limits(drive: Drive) -> list[Text]:
 
 
 async def _mode(drive: Drive) -> list[Text]:
-    """Families that need a mode before they are enabled (001:488)."""
+    """Missing mode of a family that must have a mode before it is enabled (001:488)."""
     display = drive.key("mode_display")
     if drive.profile.quirk("mode_before_enable") is None or display is None:
         return []

@@ -1,4 +1,4 @@
-"""Process data of one bus: which signals are mapped, and delivering them in units."""
+"""Process data of one bus: selection of the mapped signals, and their delivery in units."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from drivers.link import (
 )
 from drivers.texts.message import Text, text
 
-#: Signals mapped as far as they fit, the important ones first.
+#: Signals to map, in order of importance; those that do not fit are left out.
 INPUT_ROLES = (
     "status_word", "position_actual", "velocity_actual", "torque_actual", "load_position",
     "mode_display", "following_error", "error_code", "digital_inputs", "velocity_demand",
@@ -34,15 +34,18 @@ OUTPUT_ROLES = (
     "control_word", "mode", "position_target", "velocity_target", "torque_target",
     "position_offset", "velocity_offset", "torque_offset",
 )  # fmt: skip
-#: Left to the maker by CiA 402-2: a profile names them, and a drive may have none.
+#: Objects that CiA 402-2 leaves to the maker: a drive may lack what its profile names.
 _OPTIONAL_ROLES = ("load_position",)
-#: For a drive that is commanded by its profile velocity.
+#: Outputs of a drive that is commanded in Profile velocity mode.
 _SPEED_ROLES = ("control_word", "velocity_target")
 
 
 @dataclass(frozen=True, slots=True)
 class CyclicState:
-    """What the page shows of an exchange."""
+    """State of an exchange as the page shows it.
+
+    ``left_over``: signals that are not mapped, each with the reason.
+    """
 
     cycle_s: float
     dc: bool | None
@@ -53,8 +56,8 @@ class CyclicState:
 class CyclicSession:
     """The running exchange of one bus, between `start` and `stop`.
 
-    The drives with the identifiers ``by_speed`` have no cyclic mode and are given speeds in
-    Profile velocity; without that such drives keep taking their commands one by one.
+    The drives with the identifiers ``by_speed`` have no cyclic mode and receive speeds in Profile
+    velocity; other drives without a cyclic mode keep receiving single commands.
     """
 
     def __init__(self, link: Link, drives: Sequence[Drive], by_speed: Collection[str] = ()) -> None:
@@ -67,11 +70,11 @@ class CyclicSession:
         self.state: CyclicState | None = None
 
     async def start(self, cycle_s: float) -> CyclicState:
-        """Map the signals of all drives and begin.
+        """Map the signals of all drives and start the exchange.
 
         Raises:
-            NotAllowed: a drive refuses; the reason is as text.
-            Busy: it runs already.
+            NotAllowed: a drive refuses; the error contains the reason as text.
+            Busy: the exchange runs already.
         """
         if self.state is not None:
             raise Busy("axis.cyclic-exchange-runs-already", url=self.link.url)
@@ -91,7 +94,8 @@ class CyclicSession:
         try:
             await self.cyclic.start()
         except BaseException:
-            # One that came too late, or that nobody waited for, would own the drives unseen.
+            # An exchange that starts too late, or after the caller was cancelled, would own the
+            # drives unnoticed.
             with contextlib.suppress(DriveError):
                 await asyncio.shield(self.cyclic.stop())
             raise
@@ -106,7 +110,7 @@ class CyclicSession:
         return self.state
 
     async def stop(self) -> None:
-        """Brake what moves and end the exchange."""
+        """Brake all moving axes and end the exchange."""
         self.state = None
         await self.cyclic.stop()
 
@@ -117,15 +121,15 @@ class CyclicSession:
 
     @property
     def trouble(self) -> Text | None:
-        """Why a wanted exchange does not run, while it is set up again by itself; else None."""
+        """Why the exchange does not run while it is set up again automatically; None otherwise."""
         return self.cyclic.trouble
 
     def power(self) -> OwnsPowerState | None:
-        """The loop, where it owns the control words."""
+        """The loop, where it owns the control words; None otherwise."""
         return self.cyclic.power
 
     def unwatched(self, drive: Drive) -> bool:
-        """Whether nothing in the drive ends a speed or torque when this computer falls silent."""
+        """Whether the drive has no watchdog that ends a motion when this computer stops sending."""
         port = self._port(drive)
         if port.spec is None or not port.spec.watchdog.present:
             return True
@@ -134,7 +138,7 @@ class CyclicSession:
 
     @property
     def synchronous(self) -> bool:
-        """Whether setpoints take effect, and samples are taken, at the same instant each cycle."""
+        """Whether setpoints take effect and samples are taken at a fixed instant of each cycle."""
         return self.state is not None and (bool(self.state.dc) or self.link.traits.synchronous)
 
     def _port(self, drive: Drive) -> Port:
@@ -145,13 +149,16 @@ class CyclicSession:
         return self._port(drive).station
 
     def carries(self, drive: Drive, key: str) -> bool:
-        """Whether this signal comes with every cycle."""
+        """Whether this signal is part of the running process data."""
         return (
             self.running and self.state is not None and channel(drive, key) in self.state.channels
         )
 
     def newest(self, drive: Drive, keys: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """Raw values of the last cycle, of those keys that the drive sends with every cycle."""
+        """Raw values of the last cycle, for the keys that are mapped as inputs.
+
+        ``within_s``: greatest age of a value [s].
+        """
         if not self.running:
             return {}
         reported = {drive.key(role) for role in INPUT_ROLES}
@@ -161,7 +168,7 @@ class CyclicSession:
     def subscribe(
         self, drive: Drive, keys: Sequence[str], deliver: Callable[[ScopeBlock], None]
     ) -> Unsubscribe:
-        """Deliver blocks of these keys only, in the parameters' units."""
+        """Deliver blocks of exactly these keys, in the parameters' units."""
         names = tuple(channel(drive, key) for key in keys)
         parameters = [drive.parameter(key) for key in keys]
         scale = np.array([p.scale for p in parameters])
@@ -180,7 +187,7 @@ class CyclicSession:
             samples = block.samples[:, columns]
             valid = block.valid
             absent: npt.NDArray[np.bool_] = np.asarray(np.isnan(samples).any(axis=1))
-            if absent.any():  # the drive is lost, others of its bus go on
+            if absent.any():  # this drive is lost; the others on its bus go on
                 valid = ~absent if valid is None else valid & ~absent
             deliver(
                 ScopeBlock(
@@ -203,7 +210,7 @@ def channel(drive: Drive, key: str) -> str:
 
 
 async def _has(drive: Drive, role: str) -> bool:
-    """Whether a signal may be mapped: one that a drive need not have is asked for first."""
+    """Whether a signal may be mapped; an optional object is first read from the drive."""
     key = drive.key(role)
     if role not in _OPTIONAL_ROLES or key is None:
         return True
@@ -220,7 +227,7 @@ def _signals(
     directions: Sequence[str],
     needed: Collection[str] = (),
 ) -> list[CyclicSignal]:
-    """Signals of these roles; fixed process data may lack what is not needed."""
+    """Signals of these roles; fixed process data may lack those outside ``needed``."""
     found = []
     for role in roles:
         parameter = drive.profile.by_role.get(role)
@@ -237,7 +244,7 @@ def _signals(
 
 
 def _fitting_outputs(drives: Sequence[Drive], wanted: list[CyclicSignal]) -> list[CyclicSignal]:
-    """Outputs are all or nothing on the bus, so what exceeds a drive's limit is left out here."""
+    """Outputs without those that exceed a drive's limit; the bus maps all outputs or none."""
     room = {drive.id: drive.profile.pdo.max_entries if drive.profile.pdo else 8 for drive in drives}
     kept = []
     for signal in wanted:

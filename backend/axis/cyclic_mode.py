@@ -1,4 +1,4 @@
-"""The mode of an axis that is moved through the cyclic exchange: chosen for it, and given back.
+"""Restoring the mode of operation after motions through the cyclic exchange.
 
 The loop writes 6060h with its process data. A drive that keeps the mode of the last measurement
 would be enabled in it by whoever enables it next, from its panel or another program.
@@ -26,13 +26,13 @@ _STANDS_S, _TAKEN_S, _POLL_S = 2.0, 2.0, 0.01
 
 @asynccontextmanager
 async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None]:
-    """Around motions that choose a mode through the loop: afterwards 6060h is what it was.
+    """Restore 6060h after motions that choose a mode through the loop.
 
-    Nothing where somebody further out does so already, where the loop owns no mode, and where the
-    drive shows one that cannot be written (none, at power-on).
+    Does nothing where an outer context already does so, where the loop does not own the mode, and
+    where the drive shows a mode that cannot be written (none, at power-on).
 
     Raises:
-        RestoreFailed: on leaving; the mode is then a pending restore.
+        RestoreFailed: on exit; the mode is then a pending restore.
     """
     drive = axis.drive
     keys = [] if session.power() is None else await axis.restorable_mode()
@@ -55,7 +55,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
 
 
 def modes_of_the_loop(drive: Drive, session: CyclicSession, key: str) -> None:
-    """What the loop may leave in the changed ``key``: it writes past the drive's own methods."""
+    """Record the modes that the loop may leave in ``key``, as it does not write by `Drive`."""
     for mode in (Mode.PV,) if drive.id in session.by_speed else _CYCLIC:
         drive.pending_restores.commanded(key, int(mode))
 
@@ -76,17 +76,18 @@ async def _give_back(axis: Axis, session: CyclicSession, key: str, before: int) 
 
 
 async def _choose(axis: Axis, session: CyclicSession, key: str, mode: int) -> None:
-    """Of a disabled axis; by whoever writes its mode now.
+    """Write the mode of a disabled axis, through the loop where that owns the mode.
 
     Raises:
-        DriveError: it is enabled or turns, does not take it, or another drive answers here.
+        DriveError: the axis is enabled or turns, does not show the mode, or another drive
+            answers here.
     """
     drive, power = axis.drive, session.power()
     # An EP3E may trip over a mode that changes while its motor turns (001:487).
     if await axis.state() is State.OPERATION_ENABLED or not await axis.standstill(_STANDS_S):
         raise NotAllowed("axis.enabled-turns", drive=drive.name)
     if power is None or not session.running:
-        # The link may have been lost meanwhile, and another drive be there now.
+        # The link may have been lost meanwhile, and another drive may answer now.
         await confirm_identity(drive)
         await drive.energise(key, mode, axis.grant(key))
         return

@@ -1,4 +1,4 @@
-"""The faults that a drive itself remembers, with the values that it froze at each."""
+"""Fault history of a drive, with the values that the drive stored at each fault."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from profiles.schema import Fault
 
 @dataclass(frozen=True, slots=True)
 class PastFault:
-    """One remembered fault. ``fault`` is None where the code is not in the profile.
+    """One record of the fault history. ``fault`` is None where the code is not in the profile.
 
-    ``name`` states which record it is: words of the profile, or a message with its number.
+    ``name`` identifies the record: its name in the profile, or a message with its number.
     """
 
     name: Text
@@ -33,17 +33,17 @@ class PastFault:
 
 
 def history_of(drive: Drive) -> FaultHistory | None:
-    """How this family keeps past faults, or None where nothing is known of it."""
+    """How this family stores past faults; None where that is not known."""
     return functions_of(drive.profile).history
 
 
 async def read_history(axis: Axis) -> list[PastFault]:
-    """All remembered faults, newest first where the manual says which that is.
+    """All stored faults, newest first where the manual states the order.
 
     A record that is reached through a selector is selected by a write; the selector is restored.
 
     Raises:
-        NotAllowed: the drive keeps no record that can be read.
+        NotAllowed: the drive has no fault history that can be read.
         DriveError: the link is gone, or the selector could not be restored.
     """
     drive = axis.drive
@@ -89,7 +89,7 @@ async def _selected(axis: Axis, history: FaultHistory) -> list[PastFault]:
 
 
 def _name(slot: HistorySlot, number: int) -> Text:
-    """The name that the profile has for this record, else its number."""
+    """Name of the record in the profile; otherwise a message with its number."""
     return prose(slot.name) if slot.name else text("axis.record", number=number)
 
 
@@ -114,9 +114,10 @@ def _past(
 
 
 def named_fault(faults: Sequence[Fault], history: FaultHistory, code: int) -> Fault | None:
-    """The fault of the profile that a remembered code means.
+    """The fault of the profile that a stored code stands for.
 
-    By the written code where the history says how it is written, else by the value of 603Fh.
+    Matched by the printed code where the history states its format, otherwise by the value of
+    603Fh.
     """
     if history.code_format:
         text = _code_text(history, code)

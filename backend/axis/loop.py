@@ -1,4 +1,4 @@
-"""The loop of a cyclic exchange, commanded with a grant: enabling, modes and trajectories."""
+"""Commands to the loop of a cyclic exchange under a grant: enabling, modes and trajectories."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 async def drive_to(
     session: CyclicSession, drive: Drive, goal: State, mode: Mode | None, grant: Grant
 ) -> None:
-    """Let the loop walk the state machine, also to Operation enabled, and choose a mode.
+    """Have the loop change the power state, also to Operation enabled, and choose a mode.
 
     Raises:
         NotGranted: the grant is not for this axis, or has ended.
@@ -29,7 +29,7 @@ async def drive_to(
 
 
 async def give_back_mode(session: CyclicSession, drive: Drive, mode: int, grant: Grant) -> None:
-    """Let the loop write the mode that the drive had before the motion, with the power off.
+    """Have the loop write the mode that the drive had before the motion, with the power off.
 
     Raises:
         NotGranted: the grant is not for this axis.
@@ -40,7 +40,7 @@ async def give_back_mode(session: CyclicSession, drive: Drive, mode: int, grant:
 
 
 async def lower(session: CyclicSession, drive: Drive, goal: State) -> None:
-    """Let the loop go to a state without power at the motor; needs no grant.
+    """Have the loop go to a power state without power at the motor; needs no grant.
 
     Raises:
         ValueError: the motor has power in this state.
@@ -51,7 +51,7 @@ async def lower(session: CyclicSession, drive: Drive, goal: State) -> None:
 
 
 async def play(session: CyclicSession, drive: Drive, trajectory: Trajectory, grant: Grant) -> int:
-    """Give the loop setpoints to play; see `drivers.link.Cyclic.play`.
+    """Play a trajectory of setpoints in the loop; see `drivers.link.Cyclic.play`.
 
     Raises:
         NotGranted: the grant is not for this axis, or has ended.
@@ -67,11 +67,11 @@ async def play_pair(
     coupled: Coupled,
     grants: tuple[Grant, Grant],
 ) -> int:
-    """Give the loop setpoints for two axes of one machine; see `drivers.link.PlaysPairs`.
+    """Play trajectories for two axes of one machine in the loop; see `drivers.link.PlaysPairs`.
 
     Raises:
         NotGranted: a grant is not for its axis, or has ended.
-        NotAllowed: the loop of this bus moves each axis by itself.
+        NotAllowed: the loop of this bus moves single axes only.
     """
     for drive, grant in zip(drives, grants, strict=True):
         drive.require_grant(grant, drive.require("control_word"))

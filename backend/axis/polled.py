@@ -1,4 +1,4 @@
-"""606Ch and 6064h of a motion that is polled: jog, moves and homing without a cyclic exchange."""
+"""Supervision of a polled motion by 606Ch and 6064h: jog, moves, homing without cyclic exchange."""
 
 from __future__ import annotations
 
@@ -12,14 +12,18 @@ from drivers.motion.guard import SpeedGuard
 from drivers.texts.message import text
 
 _WINDOW_S = 0.5
-"""Polls come every 20 to 60 ms, and not evenly."""
+"""Window of the speed from position differences [s]; polls come unevenly, every 20 to 60 ms."""
 _MARGIN = 2.0
 _LATE_S, _LATE = 0.05, 4.0
-"""An answer that took longer, or so many times as long as the fastest, was read who knows when."""
+"""Limits of the answer time: absolute [s], and as a multiple of the fastest answer. The instant of
+a reading that took longer than both is not known well enough."""
 
 
 class PolledGuard:
-    """One motion of one axis. ``speed_rpm``: its speed limit; the position may reach twice that."""
+    """Supervision of one motion of one axis.
+
+    ``speed_rpm``: speed limit; the speed from position differences may reach twice that.
+    """
 
     def __init__(self, axis: ScaledAxis, units: AxisUnits, speed_rpm: float) -> None:
         self._axis = axis
@@ -29,10 +33,10 @@ class PolledGuard:
         self._fastest_s: float | None = None
 
     def look(self, position: int, velocity: int, asked_s: float) -> None:
-        """One poll that was asked for at ``asked_s`` (`time.monotonic`) and has just come.
+        """Check one poll, requested at ``asked_s`` (`time.monotonic`) and answered just now.
 
         Raises:
-            MotionHalted: the axis is too fast, or the two contradict each other.
+            MotionHalted: the axis is too fast, or position and velocity contradict each other.
         """
         now = time.monotonic()
         took = now - asked_s
@@ -52,5 +56,5 @@ class PolledGuard:
             )
 
     def interrupt(self) -> None:
-        """The position was set again, as homing does."""
+        """Restart the comparison after the position was redefined, as homing does."""
         self._guard.interrupt()

@@ -1,4 +1,4 @@
-"""The power state of one axis: CiA 402 words, the way between states, and STOP."""
+"""The power state of one axis: CiA 402 control words, transitions, and STOP."""
 
 from __future__ import annotations
 
@@ -34,50 +34,51 @@ from drivers.texts.message import Text, joined, text
 from drivers.texts.states import state_text
 from profiles.schema import Fault
 
-#: Longest time that one change of the power state may take (brake and bus included).
+#: Longest time that one change of the power state may take, brake and bus included [s].
 STATE_TIMEOUT_S = 3.0
 _POLL_S = 0.01
 
 
 class PowerState:
-    """State machine of one drive, by profile words or through the cyclic exchange of its bus."""
+    """State machine of one drive, by single control words or the cyclic exchange of its bus."""
 
     def __init__(self, drive: Drive) -> None:
         self.drive = drive
         pause = drive.profile.quirk("enable_pause")
         self._enable_pause_s = ((pause.milliseconds if pause else None) or 0.0) / 1000.0
-        #: What stops this family: only this word is printed in its manual.
+        #: Control word for quick stop of this family: the only one printed in its manual.
         self._stop_word = dialect_of(drive.profile).quick_stop
-        #: The last control word written, for edges.
+        #: The last control word written, to form rising edges.
         self.control_word = 0
         #: The running cyclic exchange of the axis' bus, which then writes the control word.
         self.session: CyclicSession | None = None
-        #: STOP was pressed: no word that enables may be sent until a new command is given.
+        #: STOP was pressed: no control word that enables may be sent until a new command is given.
         self.stopped = False
-        #: How many commands of people have permitted motion so far.
+        #: Number of commands by people that have permitted motion so far.
         self.permits = 0
         #: When STOP was pressed last (`time.monotonic`).
         self.stop_pressed_s = -math.inf
         #: A stop did not reach the drive; `repeat_stop` sends it again once the drive answers.
         self.stop_pending = False
         self._repeating = asyncio.Lock()
-        #: A quick stop went out, and no word since that enables. Halt has the bits that enable, so
-        #: it must not follow: the drive would leave the quick stop (CiA 402-2, transition 16).
+        #: A quick stop was sent, and no enabling control word since. Halt contains the enabling
+        #: bits and must not follow: the drive would leave the quick stop (CiA 402-2, transition
+        #: 16).
         self.quick_stop_out = False
-        #: What STOP has done since it was pressed, and when that was (monotonic).
+        #: Steps of STOP since it was pressed, and the time of the press (`time.monotonic`).
         self.stop_steps: list[StopStep] = []
         self._stop_began_s = time.monotonic()
-        #: 605Ah as it was before STOP had to change it; None where it has not.
+        #: 605Ah as it was before STOP changed it; None where STOP did not.
         self.option_before: int | None = None
 
     def permit(self) -> None:
-        """A person gave a new command: enabling is allowed again, until the next STOP.
+        """Allow enabling again, until the next STOP, as a person gave a new command.
 
-        Never called by work in progress, so that nothing enables again what was stopped.
+        Never called by work in progress, so that nothing enables a stopped axis again.
 
         Raises:
-            NotAllowed: STOP was pressed after the command had been given; it waited meanwhile, for
-                its turn, the rest of its body or the start of an exchange.
+            NotAllowed: STOP was pressed after the command had been given. The command was waiting
+                then: for its turn, the rest of its request body or the start of an exchange.
         """
         given_s = arrived_s.get()
         if given_s is not None and given_s <= self.stop_pressed_s:
@@ -86,7 +87,7 @@ class PowerState:
         self.permits += 1
 
     async def status_word(self) -> int:
-        """6041h, read now."""
+        """Status word (6041h), read now."""
         return await self.drive.raw(self.drive.require("status_word"))
 
     async def state(self) -> State:
@@ -94,11 +95,12 @@ class PowerState:
         return self.drive.decode_state(await self.status_word())
 
     async def control(self, word: int) -> None:
-        """Write 6040h.
+        """Write the control word (6040h).
 
         Raises:
             NotGranted: the word enables or moves the axis, and the calling work holds no grant.
-            NotAllowed: STOP was pressed and the word would enable the axis again.
+            NotAllowed: STOP was pressed and the word would enable the axis again, or the cyclic
+                exchange writes the control word.
         """
         if self.cyclic_power() is not None:
             raise NotAllowed("axis.cyclic-exchange-writes-control", drive=self.drive.name)
@@ -112,7 +114,7 @@ class PowerState:
         self.control_word = word
 
     async def _control_with_grant(self, key: str, word: int) -> None:
-        """A word by which the drive may go to, or move in, Operation enabled."""
+        """Write a word by which the drive may enter, or move in, Operation enabled."""
         if self.stopped:
             raise NotAllowed("axis.stop-pressed", drive=self.drive.name)
         self.drive.require_identity()
@@ -126,7 +128,7 @@ class PowerState:
         """The grant that the calling work holds.
 
         Raises:
-            NotGranted: none.
+            NotGranted: it holds none.
         """
         return self.drive.authority.require_held(self.drive.id, self.drive.name, key)
 
@@ -138,10 +140,10 @@ class PowerState:
         keys: frozenset[str] | None = None,
         ended: Ended | None = None,
     ) -> AbstractContextManager[Grant]:
-        """A grant for this axis for the length of the block; see `MotionAuthority.granted`.
+        """A grant for this axis for the duration of the block; see `MotionAuthority.granted`.
 
         Raises:
-            Busy: other work has one.
+            Busy: other work holds one.
         """
         drive = self.drive
         return drive.authority.granted(
@@ -154,17 +156,18 @@ class PowerState:
         if session is None or not session.running:
             return None
         power = session.power()
-        # A CANopen drive without cyclic modes keeps taking its commands by SDO.
+        # A CANopen drive without cyclic modes keeps receiving its commands by SDO.
         owns = getattr(power, "owns", None)
         return power if owns is None or owns(session.station(self.drive)) else None
 
     async def go_to_cyclic(
         self, session: CyclicSession, goal: State, mode: Mode | None, timeout_s: float
     ) -> None:
-        """Let the loop walk the state machine.
+        """Have the loop change the power state to ``goal``.
 
         Raises:
-            NotAllowed: the drive stays where it is, with the cause that is known; or STOP.
+            NotAllowed: the drive does not reach it (the message contains the known cause), or STOP
+                was pressed.
         """
         power = session.power()
         if power is None:
@@ -186,8 +189,8 @@ class PowerState:
                 await loop.lower(session, self.drive, goal)
             await self._until_there(goal, timeout_s)
         except BaseException:
-            # The loop would go on trying, and enable when nobody waits for it any more: when the
-            # main power comes, or a fault goes.
+            # The loop would go on trying and enable the axis when nobody waits for it any more:
+            # when the main power returns, or a fault disappears.
             if goal is State.OPERATION_ENABLED:
                 try:
                     off = State.SWITCH_ON_DISABLED
@@ -210,13 +213,13 @@ class PowerState:
             await asyncio.sleep(_POLL_S)
 
     async def go_to(self, goal: State, timeout_s: float = STATE_TIMEOUT_S) -> State:
-        """Walk the state machine to ``goal``, one transition after the other.
+        """Change the power state to ``goal``, one transition after the other.
 
-        A fault is reset only on the way to Switch on disabled: enabling never resets one, so
-        that a drive which trips on being enabled is not enabled again and again.
+        A fault is reset only on the way to Switch on disabled. Enabling never resets one, so that
+        a drive which trips on being enabled is not enabled repeatedly.
 
         Raises:
-            NotAllowed: the drive stays where it is; the message gives the cause that is known.
+            NotAllowed: the drive does not reach the state; the message contains the known cause.
         """
         if self.session is not None and self.cyclic_power() is not None:
             await self.go_to_cyclic(self.session, goal, None, timeout_s)
@@ -237,7 +240,7 @@ class PowerState:
                     await asyncio.sleep(self._enable_pause_s)
             before = state
             state = await self.state()
-            # A quick stop may fall through to Switch on disabled (605Ah 0 to 4).
+            # A quick stop may continue to Switch on disabled (605Ah = 0 to 4).
             if goal is State.QUICK_STOP_ACTIVE and state is State.SWITCH_ON_DISABLED:
                 return state
             while state is before and time.monotonic() < deadline:
@@ -291,17 +294,18 @@ class PowerState:
         return causes
 
     async def active_faults(self) -> list[Fault]:
-        """What the drive reports now, read now.
+        """Faults and warnings that the drive reports, read now.
 
         Raises:
-            DriveError: it does not answer, so it is not known.
+            DriveError: the drive does not answer, so its faults are not known.
         """
         return await read_active_faults(self.drive)
 
     async def reset_fault(self) -> State:
-        """Rising edge of the fault-reset bit, then Switch on disabled.
+        """Reset a fault by a rising edge of the fault-reset bit, then go to Switch on disabled.
 
-        Does nothing to an axis that has no fault: the words would cut the power of one that moves.
+        Does nothing to an axis without a fault, as the control words would switch off the power of
+        a moving axis.
 
         Raises:
             NotAllowed: the fault is still present.
@@ -348,12 +352,12 @@ class PowerState:
             await asyncio.sleep(_POLL_S)
 
     def forbid(self) -> None:
-        """STOP was pressed: nothing in progress, or asked for before, may enable the axis again."""
+        """Record that STOP was pressed: work in progress or requested before may not enable."""
         self.stopped = True
         self.stop_pressed_s = time.monotonic()
 
     async def stop(self) -> None:
-        """STOP by a person: quick stop, and nothing in progress may enable the axis again."""
+        """STOP by a person: quick stop, and no work in progress may enable the axis again."""
         self.forbid()
         self.stop_steps, self._stop_began_s = [], time.monotonic()
         await self.quick_stop()
@@ -365,17 +369,18 @@ class PowerState:
         parameter: str | None = None,
         figures: dict[str, float] | None = None,
     ) -> None:
-        """Note a step of STOP; with a problem it was tried in vain."""
+        """Record a step of STOP; with ``problem`` the step was tried and failed."""
         at_s = time.monotonic() - self._stop_began_s
         self.stop_steps.append(
             StopStep(code, at_s, problem is None, parameter, figures or {}, problem)
         )
 
     async def quick_stop(self) -> None:
-        """Stop now, by one write; harmless when nothing moves.
+        """Stop the axis now, as a rule by one write; harmless at standstill.
 
-        Where 605Ah is known to coast, the axis is braked by halt, and by a quick stop that brakes.
-        Where it does not reach the drive, `stop_pending` is set.
+        Where a quick stop would coast (605Ah = 0, or torque mode of some families), the axis is
+        first braked otherwise; see `brake_then_quick_stop`. Where the stop does not reach the
+        drive, `stop_pending` is set.
         """
         try:
             if self.session is not None and self.cyclic_power() is not None:
@@ -387,22 +392,22 @@ class PowerState:
                 await self.send_quick_stop()
                 self.stop_step(StepCode.QUICK_STOP)
         except BaseException:
-            # Whatever kept it: also an exchange that just ended, a drive that refused the word
-            # while it was busy, and a caller that did not wait.
+            # Whatever prevented it: also an exchange that just ended, a drive that was busy and
+            # refused the word, and a caller that was cancelled.
             self.stop_pending = True
             raise
         self.stop_pending = False
 
     async def read_stop_settings(self) -> None:
-        """Read how the drive brakes on STOP, so that STOP itself need not ask; never raises."""
+        """Read how the drive brakes on STOP, so that STOP itself need not; raises no DriveError."""
         with contextlib.suppress(DriveError):
             await self.drive.read_many(settings_keys(self.drive))
 
     async def send_quick_stop(self) -> None:
-        """One quick-stop word, by the first port that takes it.
+        """Send one quick-stop word by the first port that delivers it.
 
         Raises:
-            DriveError: that of the first port, when none takes it.
+            DriveError: no port delivers it; the error is that of the first port.
         """
         drive = self.drive
         key = drive.require("control_word")
@@ -423,8 +428,8 @@ class PowerState:
             raise
 
     async def repeat_stop(self) -> bool:
-        """Send the pending stop; returns whether one was pending and is delivered now."""
-        # Monitor and the watch over STOP both repeat it; once is enough.
+        """Send the pending stop; return whether one was pending and is delivered now."""
+        # The monitor and the supervision of STOP both repeat it; once is enough.
         async with self._repeating:
             if not self.stop_pending:
                 return False
@@ -435,10 +440,10 @@ class PowerState:
             return True
 
     async def require_stop_delivered(self) -> None:
-        """A stop that did not reach the drive comes before any new command.
+        """Deliver a pending stop before any new command.
 
         Raises:
-            DriveError: it still does not reach it.
+            DriveError: the stop still does not reach the drive.
         """
         if self.stop_pending:
             await self.quick_stop()

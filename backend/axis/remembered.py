@@ -1,6 +1,6 @@
-"""What the bench remembers of one axis next to its connection: mechanics, watch list, scales.
+"""Stored data of one axis besides its connection: mechanics, watch list, scales.
 
-One small file per axis in the state folder, written whole or not at all.
+One small file per axis in the state folder, written atomically.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from backend.store.files import write_atomically
 
 
 class AxisRecord(BaseModel):
-    """What is kept of one axis."""
+    """Stored data of one axis."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -33,18 +33,18 @@ class AxisStore:
         self._known: dict[str, AxisRecord] = {}
 
     def get(self, drive: str) -> AxisRecord:
-        """The record of an axis; an empty one where nothing (readable) is kept."""
+        """The record of an axis; an empty one where there is no readable file."""
         if drive not in self._known:
             try:
                 text = self._file(drive).read_text("utf-8")
                 self._known[drive] = AxisRecord.model_validate_json(text)
             except (OSError, ValidationError):
-                # Convenience only: a broken file must not keep the axis from being used.
+                # The record is a convenience: a damaged file must not prevent use of the axis.
                 self._known[drive] = AxisRecord()
         return self._known[drive]
 
     def put(self, drive: str, record: AxisRecord) -> AxisRecord:
-        """Keep a record.
+        """Store a record.
 
         Raises:
             StorageFailed: it cannot be written.

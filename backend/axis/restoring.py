@@ -1,4 +1,4 @@
-"""Parameters that must be restored, and cleanups that nothing may interrupt."""
+"""Restoring parameters, and cleanups that cancellation does not interrupt."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import Text, joined, parts_of, text
 from profiles.schema import Raw
 
-#: Deadline of a cleanup.
+#: Deadline of a cleanup [s].
 CLEANUP_TIMEOUT_S = 5.0
 
 
 class RestoreFailed(DriveError):
-    """A cleanup could not put something back; the message lists what."""
+    """A cleanup could not restore everything; the message lists what is left."""
 
     kind = "restore-failed"
 
 
 @asynccontextmanager
 async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
-    """Put these parameters back to what they are now, on every exit.
+    """Restore these parameters to their present values on every exit.
 
     Raises:
-        RestoreFailed: on leaving, naming what could not be restored.
+        RestoreFailed: on exit; the message names what could not be restored.
     """
     before: dict[str, Raw] = {}
     for key in keys:
@@ -46,7 +46,7 @@ async def restoring(drive: Drive, *keys: str) -> AsyncIterator[dict[str, Raw]]:
 
 
 async def _put_back(drive: Drive, before: dict[str, Raw], earlier: BaseException | None) -> None:
-    """Restore; what failed before is reported as well, it may be an inner restore."""
+    """Restore; an ``earlier`` error, which may be an inner restore, is reported as well."""
     name = drive.name
     try:
         await _to_its_end(lambda: _restore(drive, before), CLEANUP_TIMEOUT_S, name)
@@ -70,7 +70,7 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
             try:
                 if (await drive.read(key)).raw != raw:
                     if not same:
-                        # The link may have been lost meanwhile, and another drive be there now.
+                        # The link may have been lost meanwhile, and another drive may answer now.
                         await confirm_identity(drive)
                         same = True
                     await drive.put_back(key, raw)
@@ -86,21 +86,24 @@ async def _restore(drive: Drive, before: dict[str, Raw]) -> None:
 
 
 def value_before(key: str, raw: Raw) -> Text:
-    """A parameter with the raw value that it had."""
+    """Text of a parameter with its earlier raw value."""
     return text("axis.value-before", parameter=key, before=raw)
 
 
 def not_restored(drive: Drive, key: str, raw: Raw, cause: DriveError) -> Text:
-    """One parameter that was not restored: what it was at first, and why."""
+    """Text of a parameter that was not restored: its original raw value and the cause."""
     before = drive.pending_restores.original(key, raw)
     return text("axis.parameter-not-restored", parameter=key, before=before, cause=cause.text)
 
 
 def _put_first_error_first(earlier: BaseException | None, late: DriveError) -> None:
-    """A cleanup that fails must not hide why it was due: that comes first in its words."""
+    """Put the earlier error first in the text of ``late``.
+
+    A cleanup that fails must not hide the error that made it necessary.
+    """
     if not isinstance(earlier, DriveError) or earlier is late:
         return
-    # Each piece of advice once, however many cleanups failed one after the other.
+    # Each remedy once, however many cleanups failed one after the other.
     known = (*parts_of(earlier.remedy_text), *parts_of(late.remedy_text))
     advice = list({each.words(): each for each in known}.values())
     late.text = joined((earlier.text, late.text))
@@ -110,8 +113,8 @@ def _put_first_error_first(earlier: BaseException | None, late: DriveError) -> N
 async def shielded(cleanup: Callable[[], Awaitable[None]], timeout_s: float, drive: str) -> None:
     """Run a cleanup to its end even when the surrounding task is cancelled again.
 
-    Where it is run because something failed (from ``finally`` or ``except``), an error of its own
-    reports that first.
+    Where it runs because of an error (in ``finally`` or ``except``), an error of the cleanup itself
+    reports that earlier error first.
 
     Raises:
         LinkTimeout: the cleanup itself took longer than ``timeout_s``.

@@ -1,4 +1,4 @@
-"""The scales of one axis: read once, and read again when what they rest on changes."""
+"""The scales of one axis: read once, and again when the objects that define them change."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from backend.scales.units import AxisUnits, read_units
 from drivers.errors import DriveError
 from profiles.schema import Raw
 
-#: One motion relies so long on its last look at the scales. A look takes some ten reads, and a
-#: server compares the scales of an axis with power every 0.9 s anyway.
+#: Time for which one motion relies on its last reading of the scales [s]. A reading takes some ten
+#: requests, and a server compares the scales of an axis with power every 0.9 s anyway.
 JUST_LOOKED_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class SmallMoves:
-    """The small moves by increments so far: the last one, and the longest of all.
+    """The small moves by increments so far: the last and the longest one [increments].
 
-    ``raw_per_inc_s``: raw 606Ch per increment per second in the last one; None: not found.
+    ``raw_per_inc_s``: raw 606Ch per increment per second in the last one; None: not determined.
     """
 
     moved: int
@@ -38,14 +38,14 @@ class SmallMoves:
 
 @dataclass(frozen=True, slots=True)
 class _Planned:
-    """The units by which a motion was planned; ``grant`` is that of the whole motion."""
+    """The units by which a motion was planned; ``grant`` is the outermost grant of the motion."""
 
     grant: Grant | None
     units: AxisUnits
 
 
 class ScaledAxis(PowerState):
-    """A power state whose positions and speeds have units."""
+    """Power state of one axis, with units for its positions and speeds."""
 
     def __init__(self, drive: Drive) -> None:
         super().__init__(drive)
@@ -55,16 +55,16 @@ class ScaledAxis(PowerState):
         self._planned: _Planned | None = None
         #: Objects of the scales that the drive refused as absent, until `forget_scales`.
         self._absent: frozenset[str] = frozenset()
-        #: The motion (its grant) that looked at the scales last before power, and when.
+        #: Grant of the motion that last checked the scales before power, and the time (monotonic).
         self._looked: tuple[Grant | None, float] = (None, -math.inf)
-        #: None until one was made since this axis is connected, or since its scales changed.
+        #: None until a small move is made after the connection or the last change of scales.
         self.small_moves: SmallMoves | None = None
-        #: Called with the keys of objects of the scales that have other values than they had.
+        #: Called with the keys of those objects of the scales whose values changed.
         self.scales_changed: Callable[[list[str]], None] = lambda _keys: None
         drive.listeners.add(self._units_may_have_changed)
 
     async def units(self) -> AxisUnits:
-        """Units with the present gearing, read once until `forget_scales`."""
+        """Units with the present gearing; read from the drive where none are known."""
         if self._units is None:
             units = await read_units(self.drive, self._taught, self._absent)
             known = self.drive.readings
@@ -76,7 +76,7 @@ class ScaledAxis(PowerState):
             raws = {key: known[key].raw for key in self.drive.profile.unit_keys if key in known}
             before, self._unit_raws, self._units = self._unit_raws, raws, units
             if before and raws != before:
-                # An increment is another one now: how far the last moves went says nothing.
+                # The increment has changed: the lengths of earlier small moves are no longer valid.
                 self.small_moves = None
                 self.scales_changed(
                     sorted(key for key in raws | before if raws.get(key) != before.get(key))
@@ -85,24 +85,24 @@ class ScaledAxis(PowerState):
         return self._units
 
     async def read_scales(self) -> AxisUnits:
-        """Units with the gearing that the drive has now, read from it: others may change it.
+        """Units with the gearing read from the drive now, as other programs may change it.
 
         Raises:
-            DriveError: the objects that state them cannot be read.
+            DriveError: the objects of the scales cannot be read.
         """
         self._units = None
         return await self.units()
 
     async def require_certain_scales(self) -> AxisUnits:
-        """The units, read now, where an envelope in them means what it says.
+        """The units, read now, where all scales are certain, so that an envelope in them holds.
 
-        Within one motion (a grant of the calling work) they must be those that it began with:
-        places and setpoints were computed by them.
+        Within one motion (a grant of the calling work) they must be those that it began with, as
+        its positions and setpoints were computed by them.
 
         Raises:
-            ScaleUnknown: a scale is not certain: nothing may be moved by unit.
-            ScaleChanged: the drive has other scales than at the begin of this motion.
-            DriveError: the objects that state them cannot be read.
+            ScaleUnknown: a scale is not certain, so no motion by unit is permitted.
+            ScaleChanged: the drive has other scales than at the beginning of this motion.
+            DriveError: the objects of the scales cannot be read.
         """
         whole = self.drive.authority.outermost(self.drive.id)
         units = await (self.units() if self._just_looked(whole) else self.read_scales())
@@ -114,7 +114,7 @@ class ScaledAxis(PowerState):
         return units
 
     async def require_planned_scales(self) -> None:
-        """The last look before the axis gets power: the scales are those of the plan.
+        """Check, last before the axis gets power, that the scales are those of the plan.
 
         Raises:
             ScaleUnknown, ScaleChanged, DriveError: as `require_certain_scales`.
@@ -133,7 +133,7 @@ class ScaledAxis(PowerState):
             self._require_same(before, units)
 
     def _just_looked(self, whole: Grant | None) -> bool:
-        """Whether this motion has looked at the scales before power, a short time ago."""
+        """Whether this motion has checked the scales less than `JUST_LOOKED_S` ago."""
         grant, at_s = self._looked
         return whole is not None and grant is whole and time.monotonic() - at_s < JUST_LOOKED_S
 
@@ -142,7 +142,10 @@ class ScaledAxis(PowerState):
             raise ScaleChanged("scales.changed", drive=self.drive.name)
 
     async def look_at_scales(self) -> None:
-        """Ask again for what the scales rest on; never raises. `scales_changed` reports changes."""
+        """Read the objects of the scales again; a change is reported by `scales_changed`.
+
+        Raises no DriveError.
+        """
         known = list(self._unit_raws)
         with contextlib.suppress(DriveError):
             if known:
@@ -151,30 +154,30 @@ class ScaledAxis(PowerState):
 
     @property
     def known_units(self) -> AxisUnits | None:
-        """Units as they were read last; None before that, and after the gearing changed."""
+        """Units as read last; None before the first reading and after a change of the gearing."""
         return self._units
 
     @property
     def taught(self) -> Taught | None:
-        """What a person has said of the scales of this axis."""
+        """Scales of this axis that a person stated or confirmed."""
         return self._taught
 
     def teach(self, taught: Taught | None) -> None:
-        """Scales as a person states or confirms them; they count from the next motion on."""
+        """Set the scales that a person states or confirms; they apply from the next motion on."""
         self._taught = taught
         self.forget_scales()
 
     def moved_small(self, moved: int, raw_per_inc_s: float | None) -> None:
-        """A small move by increments has ended well."""
+        """Record a small move by increments that ended without error."""
         before = 0 if self.small_moves is None else self.small_moves.longest
         self.small_moves = SmallMoves(moved, max(abs(moved), before), raw_per_inc_s)
 
     def forget_scales(self) -> None:
-        """The gearing changed, or may have: it is read before the next use."""
+        """Discard the units, as the gearing may have changed; the next use reads it again."""
         self._units, self._absent = None, frozenset()
 
     def _units_may_have_changed(self, readings: list[Reading]) -> None:
-        """Whoever wrote the gearing (a page, a set, the panel): units are read again."""
+        """Discard the units where a reading differs, whoever wrote it (page, set, drive panel)."""
         for reading in readings:
             known = self._unit_raws.get(reading.key)
             if known is not None and reading.raw is not None and reading.raw != known:

@@ -1,4 +1,4 @@
-"""Taking over what a person says of an axis' scales: by a small move, or from a data sheet."""
+"""Scales of an axis as stated by a person: after a small move, or from a data sheet."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from backend.scales.units_found import nearest_unit
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 
-#: Revolutions that a person can distinguish; fewer are a guess.
+#: Smallest travel that a person can estimate by eye [rev].
 _LEAST_REV = 0.05
 _MOST_REV = 1e6
 
 
 async def confirmed(axis: Axis, turned_rev: float) -> Taught:
-    """The scales after the last small move, of which a person says how far the shaft turned.
+    """The scales after the last small move, for which a person states how far the shaft turned.
 
-    The speed's unit is the usual one that fits 606Ch meanwhile; where 606Ch showed nothing, or in a
-    factor that is no usual unit, it stays as it was.
+    The unit of speed is the usual unit that fits 606Ch during the move. Where 606Ch showed nothing,
+    or its factor fits no usual unit, the unit stays as it was.
 
     Raises:
         NotAllowed: no small move was made with the scales that the drive has now, or 606Ch has
-            the other sign.
-        OutOfRange: too little for an eye, or too much.
+            the opposite sign of 6064h.
+        OutOfRange: too short to be estimated by eye, or too long.
     """
-    # A small move by other increments than those of now teaches nothing.
+    # A small move made with other increments than the present ones does not count.
     await axis.read_scales()
     drive, last = axis.drive, axis.small_moves
     if last is None:
@@ -60,10 +60,11 @@ async def stated(
     raw_per_rpm: float | None,
     raw_per_rpm_s: float | None,
 ) -> Taught:
-    """Scales from a data sheet; what is None stays as it was taught before.
+    """Scales from a data sheet; a scale that is None stays as stated before.
 
     Raises:
-        OutOfRange: one is no positive number. DriveError: the drive cannot be asked.
+        OutOfRange: a scale is not a positive number.
+        DriveError: the objects of the scales cannot be read.
     """
     before = axis.taught or Taught()
     for name, value in (

@@ -1,4 +1,4 @@
-"""``servodeck bus``: what goes over the wires."""
+"""``servodeck bus``: recording the frames of a bus."""
 
 from __future__ import annotations
 

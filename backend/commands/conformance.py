@@ -1,4 +1,4 @@
-"""``servodeck conformance``: rules of the public standards, tried on a slave over its bus."""
+"""``servodeck conformance``: rules of the public standards, tested on a slave over its bus."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def conformance(
 
 
 async def checked(link: Link, url: str, station: int | None) -> list[dict[str, Any]]:
-    """The rules on one station, or on each that a search finds.
+    """Test the rules on one station, or on each that a scan finds.
 
     Raises:
-        NotAllowed: nothing answers there.
+        NotAllowed: no station answers.
     """
     wanted = None if station is None else [station]
     seen = {each.station: each for each in await link.scan(show_progress, wanted)}
@@ -68,7 +68,7 @@ async def checked(link: Link, url: str, station: int | None) -> list[dict[str, A
 
 
 def shown(finding: Finding) -> dict[str, Any]:
-    """A finding for scripts."""
+    """A finding as JSON values, for scripts."""
     rule, outcome = finding.rule, finding.outcome
     return {
         "code": rule.code.removeprefix("conformance."),

@@ -72,7 +72,7 @@ async def _here(
 ) -> list[dict[str, Any]]:
     found = {each.station: each for each in await link.scan(show_progress, None)}
     results = []
-    # A station that was named and not found is examined all the same: that is the question.
+    # A station that was named but not found is examined as well, to find out why.
     for number in sorted(found) if station is None else [station]:
         chosen = load_profile(profile) if profile else _fitting(link.kind, found.get(number))
         if chosen is None and station is None and found[number].is_other_device:
@@ -94,7 +94,7 @@ async def _here(
 
 
 def _fitting(kind: str, found: Found | None) -> ProfileOf | None:
-    """The profile of what was found; of an unknown drive that of the standard, no maker's."""
+    """The profile that matches a found drive; for an unknown drive the standard one."""
     known = match_profiles(kind, found) if found is not None else []
     sure = (m for m in known if m.confidence != "possible")
     standard = (m for m in known if m.profile.drive == STANDARD)
@@ -105,10 +105,10 @@ def _fitting(kind: str, found: Found | None) -> ProfileOf | None:
 async def tried(
     link: Link, station: int, profile: ProfileOf, causes: Sequence[Cause]
 ) -> list[dict[str, Any]]:
-    """Each setting by itself until the station reaches Operational; then all is as it was.
+    """Try each setting by itself until the station reaches Operational, undoing each.
 
-    The exchange has ended and the drive is back in Pre-Operational after each trial, and the
-    profile that was attached before is attached again.
+    After each trial the exchange has ended, the drive is in Pre-Operational again, and the profile
+    that was attached before is attached again.
     """
     found = []
     for trial in trials(causes, profile):
@@ -132,7 +132,7 @@ def _words(result: Examined) -> str | None:
 
 
 def shown(cause: Cause) -> dict[str, Any]:
-    """A cause for scripts."""
+    """A cause as JSON values, for scripts."""
     text = cause.text
     return {
         "code": cause.code,

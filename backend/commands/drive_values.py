@@ -1,4 +1,4 @@
-"""Raw values that a drive holds now, read here or by a running server."""
+"""Present raw values of a drive, read by the command or by a running server."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from profiles.schema import Profile, Raw
 
 
 class Now(NamedTuple):
-    """A drive's name, its profile, and raw values by key, None where one could not be read."""
+    """A drive's name, its profile, and raw values by key; None for a value that was not read."""
 
     name: str
     profile: Profile
@@ -24,7 +24,7 @@ class Now(NamedTuple):
 async def values_now(place: Place, keys: Collection[str] = ()) -> Now:
     """Read these parameters; keys that the drive does not have are left out.
 
-    What a slow drive did not give is asked for once more.
+    Values that a slow drive did not return are read once more.
     """
     if place.server is None:
         async with drive_at(place.url, place.station, place.profile) as drive:

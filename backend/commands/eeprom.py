@@ -1,4 +1,4 @@
-"""``servodeck eeprom``: the EEPROM of an EtherCAT drive, saved, compared, restored."""
+"""``servodeck eeprom``: save, compare and restore the EEPROM of an EtherCAT drive."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Yes = Annotated[bool, typer.Option("--yes", help="second confirmation; else it i
 
 
 class _Shown(NamedTuple):
-    """A plan as it is printed, from here or from a server."""
+    """A plan as it is printed, made by the command or by a server."""
 
     digest: str
     words: int
@@ -223,10 +223,10 @@ async def _planned(link: EthercatLink, station: int, what: str, data: bytes, unk
 
 
 def _confirmed(shown: _Shown, confirm: str | None, yes: bool) -> bool:
-    """Both confirmations; False where there is nothing to write.
+    """Show the plan and ask for both confirmations; False where there is nothing to write.
 
     Raises:
-        NotAllowed: one of them is missing, or the digest is of another change.
+        NotAllowed: a confirmation is missing, or the digest belongs to another plan.
     """
     if not shown.changes:
         print_text("printed.eeprom-like-this")

@@ -1,4 +1,4 @@
-"""``servodeck friction``: the friction map, and the table against its ripple."""
+"""``servodeck friction``: the friction map, and a table that compensates the torque ripple."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `servodeck io`, ``faults`` and ``gear`` print, whoever was asked."""
+"""Answers printed by `servodeck io`, ``faults`` and ``gear``, from a bus or from a server."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from profiles.schema import Raw
 
 
 class Terminal(NamedTuple):
-    """One terminal as it is; None where the drive does not report."""
+    """Present state of one terminal; None where the drive does not report it."""
 
     name: str
     direction: str
@@ -23,7 +23,7 @@ class Terminal(NamedTuple):
 
 
 class Past(NamedTuple):
-    """One fault that the drive remembers; ``name`` is None where its code is not known."""
+    """One record of the fault history; ``name`` is None where its code is not known."""
 
     record: str
     code: str
@@ -33,7 +33,7 @@ class Past(NamedTuple):
 
 
 class Faults(NamedTuple):
-    """Present and past. ``hidden`` past ones can only be read by the maker."""
+    """Active and past faults. ``hidden``: number of records that only the maker can read."""
 
     active: list[ActiveFault]
     past: list[Past]
@@ -41,7 +41,10 @@ class Faults(NamedTuple):
 
 
 class Gear(NamedTuple):
-    """A gear as planned: key, name and raw value of each parameter; ``before`` once written."""
+    """A planned gear: key, name and raw value of each parameter.
+
+    Once written: ``before`` holds the earlier raw values, ``waits`` the keys not in effect yet.
+    """
 
     values: list[tuple[str, str, int]]
     travel_per_motor_turn: float
@@ -54,7 +57,7 @@ class Gear(NamedTuple):
 
 
 def of_plan(plan: GearPlan) -> Gear:
-    """A plan that was made here."""
+    """The answer for a plan that this command made."""
     return Gear(
         [(v.parameter.key, v.parameter.name, v.raw) for v in plan.values],
         plan.travel_per_motor_turn,

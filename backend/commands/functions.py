@@ -1,4 +1,4 @@
-"""``servodeck io``, ``faults``, ``gear``, ``braking``: a drive's functions, here or by a server."""
+"""``servodeck io``, ``faults``, ``gear``, ``braking``: functions of a drive."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _UNKNOWN = "not in the profile"
 
 
 class _Functions(Protocol):
-    """`local_functions` and `remote_functions`."""
+    """Interface of `local_functions` and `remote_functions`."""
 
     async def terminals(self, place: Place) -> list[Terminal]: ...
 
@@ -36,7 +36,7 @@ class _Functions(Protocol):
 
 
 def _by(where: Place) -> _Functions:
-    """Who does it."""
+    """The functions for a bus opened here, or those for a server."""
     return local_functions if where.server is None else remote_functions
 
 

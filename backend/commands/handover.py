@@ -1,4 +1,4 @@
-"""``servodeck handover``: lists for the machine's controller, and what its lists overwrite."""
+"""``servodeck handover``: start-up lists for the machine's controller, and comparison with them."""
 
 from __future__ import annotations
 

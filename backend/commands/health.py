@@ -84,7 +84,7 @@ def repeat(
             known = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
             if known.baseline is None:
                 raise NotAllowed("health.no-baseline", axis=axis)
-            # Consent is given for one motion: that of the baseline is not adopted.
+            # Consent is given for one motion only, so that of the baseline does not count.
             body = {**known.baseline.settings, "rounds": CHECKS, "consent": consent}
             found = await at.result(f"/drives/{drive.id}/jobs/health", body)
             now = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
@@ -166,13 +166,13 @@ async def _drive(at: Remote, name: str) -> DriveSummary:
 
 
 async def _newest(at: Remote, drive: DriveSummary) -> list[int]:
-    """The rounds of the newest health check that are enough, back in time while measured alike."""
+    """Ids of the newest rounds: those of the last health check, but at least `LEAST_REPEATS`."""
     known = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
     return [each.id for each in known.runs][-max(LEAST_REPEATS, _last_check(known)) :]
 
 
 def _last_check(known: AxisHealth) -> int:
-    """How many rounds the newest health check has: they name the same raw data."""
+    """Number of rounds of the newest health check, which share the same raw data."""
     if not known.runs:
         return 0
     newest = known.runs[-1].measurements

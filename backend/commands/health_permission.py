@@ -1,6 +1,6 @@
 """``servodeck health permit|permission|withdraw|trigger``: runs without a person.
 
-All ask the server that has the axis; only ``trigger`` moves it, where that is permitted.
+All are requests to the server that has the axis; only ``trigger`` moves it, where permitted.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def _show(axis: str, found: HealthPermissionInfo | None, as_json: bool) -> None:
 
 
 def lines_of(axis: str, found: HealthPermissionInfo | None) -> list[str]:
-    """A permission and its newest attempts, as text."""
+    """A permission and its newest attempts, as lines of text."""
     if found is None:
         return [text("health.permission-none", axis=axis).words(language())]
     until = f"{found.until:%Y-%m-%d %H:%M} UTC"

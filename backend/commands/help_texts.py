@@ -1,4 +1,4 @@
-"""What ``--help`` prints, in the language of whoever asks."""
+"""Texts of ``--help`` in the language of the user."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ FILE = Path(drivers.texts.__file__).with_name("help.zh.yaml")
 
 @cache
 def chinese() -> dict[str, str]:
-    """By the English text, with single spaces, the Chinese one."""
+    """The Chinese texts, by the English text with single spaces."""
     texts: dict[str, str] = yaml.safe_load(FILE.read_text("utf-8"))
     return texts
 
 
 def plain(text: str) -> str:
-    """A text as it is named in the file."""
+    """A text with single spaces, as it is a key in the file."""
     return " ".join(text.split())
 
 
 def translate(command: TyperCommand | TyperGroup) -> None:
-    """Replace the help of a command, its options, and the commands below it by the Chinese one.
+    """Replace the help of a command, its options and its subcommands by the Chinese texts.
 
     A text that is not in the file stays as it is.
     """

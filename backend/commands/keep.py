@@ -1,4 +1,4 @@
-"""``servodeck backup``, ``restore``, ``audit …`` and ``library …``: what a station keeps."""
+"""``servodeck backup``, ``restore``, ``audit …`` and ``library …``: stored data of a station."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ Out = Annotated[Path | None, typer.Option(help="file to write; by default the te
 
 
 def station_records(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
-    """What the station of this folder keeps, with the terminal's user as who acts."""
+    """The records of the station of this folder, with the terminal's user as the acting person."""
     who = replace(LOCAL, person=f"{getpass.getuser()} (terminal)")
     acting.set(Actor(who))
     return Records(state_folder(config), Journal(), database, blobs)
 
 
 def _existing(config: Path | None, database: str | None, blobs: str | None = None) -> Records:
-    """The same, where there is something to look at.
+    """The records of a station, where its database exists.
 
     Raises:
         NotAllowed: there is no database in this folder.

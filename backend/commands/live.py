@@ -1,7 +1,7 @@
-"""``servodeck jog`` and ``servodeck scope``: through a running server, as a page does it.
+"""``servodeck jog`` and ``servodeck scope``: through a running server, like a page.
 
-A jog lasts as long as the command: its signs of life stop with it, whatever ends it, and the axis
-is braked 200 ms later. Samples are written as they come; what was lost on the way is counted.
+A jog lasts as long as the command: its signs of life end with it for whatever reason, and the axis
+is braked 200 ms later. Samples are written as they arrive; lost samples are counted.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def scope(
 
 
 def _why(ended: JogEnded) -> Text:
-    """Why a jog ended, in whatever language this command answers."""
+    """Why a jog ended, as a text in the language of this command."""
     if (message := ended.reason_message) is None:
         return prose(ended.reason)
     return Text.from_wire(message.model_dump())
@@ -124,7 +124,7 @@ def _needed(url: str, server: str | None) -> str:
 
 @asynccontextmanager
 async def _page(server: str) -> AsyncIterator[ClientConnection]:
-    """The live connection of a page, greeted."""
+    """A live connection like that of a page, after the server's greeting."""
     address = server.rstrip("/").replace("http", "ws", 1) + "/api/v1/live"
     headers = {**authorisation(), "Accept-Language": language()}
     try:
@@ -138,7 +138,11 @@ async def _page(server: str) -> AsyncIterator[ClientConnection]:
 
 
 def _reported(message: str) -> Hello | JogEnded | ScopeInfo | None:
-    """What a message says, None where it is about something else; a refusal is raised."""
+    """The content of a message; None for other kinds of messages.
+
+    Raises:
+        NotAllowed: the message is a refusal.
+    """
     try:
         news = _News.validate_json(message)
     except ValidationError:
@@ -149,7 +153,12 @@ def _reported(message: str) -> Hello | JogEnded | ScopeInfo | None:
 
 
 async def _next(page: ClientConnection, kind: type[Hello | JogEnded]) -> Hello | JogEnded:
-    """The next message of this kind; a refusal is raised."""
+    """The next message of this kind.
+
+    Raises:
+        NotAllowed: the server refuses.
+        LinkLost: the server has ended the connection.
+    """
     async for message in page:
         if not isinstance(message, bytes) and isinstance(news := _reported(message), kind):
             return news
@@ -157,7 +166,7 @@ async def _next(page: ClientConnection, kind: type[Hello | JogEnded]) -> Hello |
 
 
 async def _hold(page: ClientConnection, request: dict[str, object], seconds: float) -> JogEnded:
-    """Hold the button; released in time, by Ctrl+C, or because the jog has ended by itself."""
+    """Hold the button until the time is over, Ctrl+C is pressed, or the jog has ended by itself."""
     about = {"drive": request["drive"]}
     await page.send(json.dumps(request))
     end = asyncio.ensure_future(_next(page, JogEnded))
@@ -172,7 +181,7 @@ async def _hold(page: ClientConnection, request: dict[str, object], seconds: flo
     finally:
         if not end.done():
             end.cancel()
-            # Where the line is gone the server brakes by itself: no sign of life comes any more.
+            # Where the connection is lost the server brakes by itself, without signs of life.
             with contextlib.suppress(WebSocketException, OSError):
                 await page.send(json.dumps({"type": "jog_stop"} | about))
     assert isinstance(ended, JogEnded)
@@ -181,10 +190,10 @@ async def _hold(page: ClientConnection, request: dict[str, object], seconds: flo
 
 @dataclass
 class Recording:
-    """A CSV file of samples: seconds, then one column per channel; empty where none came.
+    """A CSV file of samples: time [s], then one column per channel; empty without a sample.
 
-    Every drive is a stream of its own. Samples of the same moment become one row; rows are written
-    once nothing older than `_MERGE_S` can come.
+    Every drive is a separate stream. Samples of the same instant become one row; a row is written
+    once samples `_MERGE_S` later have arrived.
     """
 
     file: IO[str]
@@ -196,7 +205,7 @@ class Recording:
     _waiting: dict[int, list[float]] = field(default_factory=dict)
 
     def head(self, info: ScopeInfo) -> None:
-        """The first line, once the server has said what comes."""
+        """Write the heading, once the server has reported the channels."""
         if self._head:
             return
         titles = [
@@ -207,7 +216,7 @@ class Recording:
         self.file.write(self._head + "\n")
 
     def add(self, samples: Samples) -> None:
-        """Another block."""
+        """Add a block of samples."""
         self.dropped += samples.dropped
         for moment, row in zip(samples.times_s, samples.values, strict=True):
             place = round(float(moment) * 1e6)
@@ -222,12 +231,12 @@ class Recording:
             self._write(max(self._waiting) - round(_MERGE_S * 1e6))
 
     def end(self) -> None:
-        """Write what is left."""
+        """Write the remaining rows."""
         if self._waiting:
             self._write(max(self._waiting))
 
     def _write(self, until: int) -> None:
-        """Rows up to this moment, in their order."""
+        """Write the rows up to this time [µs], in order."""
         for place in sorted(p for p in self._waiting if p <= until):
             row = self._waiting.pop(place)
             moment = place / 1e6

@@ -1,4 +1,4 @@
-"""``servodeck io``, ``faults`` and ``gear`` on a bus that is opened for the command."""
+"""``servodeck io``, ``faults`` and ``gear`` on a bus that the command opens."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def terminals(place: Place) -> list[Terminal]:
 
 
 async def faults(place: Place) -> Faults:
-    """Active faults and the drive's own record, read now."""
+    """Active faults and the drive's own fault history, read now."""
     async with drive_at(place.url, place.station, place.profile) as drive:
         active = await read_active_faults(drive)
         history = history_of(drive)
@@ -62,7 +62,7 @@ async def faults(place: Place) -> Faults:
 
 
 async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
-    """Plan the gear with the drive's encoder, and write it where that is wanted."""
+    """Plan the gear for the drive's encoder, and write it with ``write``."""
     async with drive_at(place.url, place.station, place.profile) as drive:
         axis = Axis(drive)
         plan = await gears.plan(axis, mechanics)

@@ -1,4 +1,4 @@
-"""``servodeck params`` on a bus that is opened for the length of the command."""
+"""``servodeck params`` on a bus that the command opens."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from profiles.schema import Raw
 
 
 async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
-    """Read parameters and print them; whether all could be read."""
+    """Read parameters and print them; return whether all could be read."""
     async with drive_at(place.url, place.station, place.profile) as drive:
         readings = await drive.read_many(keys)
         wanted = [drive.parameter(key) for key in keys]
@@ -39,7 +39,7 @@ async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
     async with drive_at(place.url, place.station, place.profile) as drive:
         wanted = [values.assignment(drive.parameter, text) for text in assignments]
         for parameter, value in wanted:
-            # Everything is checked before the first byte is written.
+            # All values are checked before the first one is written.
             drive.check_write(parameter.key, value, raw=raw)
         for parameter, value in wanted:
             print(values.line(parameter, await drive.write(parameter.key, value, raw=raw)))
@@ -77,7 +77,7 @@ async def save(place: Place) -> None:
 
 
 async def restore(place: Place, *, keep: bool) -> None:
-    """Restore what a motion left that was cut off, or let it stay as it is."""
+    """Restore values left by an interrupted motion or, with ``keep``, accept them."""
     async with drive_and_pending(place.url, place.station, place.profile) as (drive, pending):
         listed = drive.pending_restores.entries
         if not listed:
@@ -96,7 +96,7 @@ async def restore(place: Place, *, keep: bool) -> None:
 
 
 async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
-    """Print what differs; whether anything does."""
+    """Print the differences; return whether there are any."""
     content = _content(file)
     async with drive_at(place.url, place.station, place.profile) as drive:
         rows = await _differences(drive, content, file)
@@ -105,7 +105,7 @@ async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
 
 
 async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool:
-    """Write what differs after it was shown; whether every value was kept."""
+    """Show the differences and write them; return whether the drive kept every value."""
     content = _content(file)
     async with drive_at(place.url, place.station, place.profile) as drive:
         keys = values.chosen(await _differences(drive, content, file), yes=yes)

@@ -98,11 +98,11 @@ def bit_rate(
 
 
 async def _meant(link: CanopenLink, identity: str | None) -> LssIdentity:
-    """The identity that was given, else the node that a search finds.
+    """The identity that was given, otherwise that of the node that a search finds.
 
     Raises:
         OutOfRange: not four numbers.
-        NotAllowed: nobody answers, or several.
+        NotAllowed: no node answers, or several do.
     """
     if identity is not None:
         try:

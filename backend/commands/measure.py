@@ -1,4 +1,4 @@
-"""What all measurements without the page have in common."""
+"""Common parts of all measurements from the command line."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ async def exchanging(
     url: str | None, station: int, profile: str | None, cycle_ms: float, envelope: Envelope,
     consent: bool, *, closes_loops: bool = True,
 ) -> AsyncIterator[tuple[Axis, CyclicSession]]:  # fmt: skip
-    """The drive with its bus exchanging process data, all of it ended afterwards.
+    """The axis of a drive and its running cyclic exchange; both are ended afterwards.
 
     ``closes_loops`` as in `Tool`.
     """
@@ -71,10 +71,10 @@ async def exchanging(
 async def exchanging_pair(
     url: str | None, stations: tuple[int, str], profile: str | None, settings: ToolSettings
 ) -> AsyncIterator[tuple[Axis, Axis, CyclicSession]]:
-    """As `exchanging`, with two drives of one bus; the second station as it was typed.
+    """As `exchanging`, with two drives on one bus; the second station is a string as typed.
 
     Raises:
-        NotAllowed: the second station is no number, or the first one again.
+        NotAllowed: the second station is not a number, or equals the first.
     """
     from backend.commands.scales import take_taught
     from backend.tools.sweep import profile_speed
@@ -105,7 +105,7 @@ async def exchanging_pair(
 
 @asynccontextmanager
 async def reading(url: str | None, station: int, profile: str | None) -> AsyncIterator[Axis]:
-    """The drive for a tool that reads alone: no exchange, no grant, and nothing is written."""
+    """The axis for a tool that only reads: no exchange, no grant, and nothing is written."""
     from backend.commands.scales import take_taught
 
     assert url is not None, "Where.asked says so"
@@ -116,7 +116,7 @@ async def reading(url: str | None, station: int, profile: str | None) -> AsyncIt
 
 
 class Where(NamedTuple):
-    """A drive by bus URL and station, or by the name that a server gives it."""
+    """A drive by bus URL and station, or by its name on a server."""
 
     url: str | None
     station: int
@@ -126,10 +126,11 @@ class Where(NamedTuple):
 
     @property
     def asked(self) -> str | None:
-        """The server to ask; None where the bus is opened here.
+        """Address of the server to use; None where the bus is opened here.
 
         Raises:
-            NotAllowed: neither a bus nor a drive of a server is named. OutOfRange: no bus URL.
+            NotAllowed: neither a bus nor a drive of a server is given.
+            OutOfRange: not a bus URL.
         """
         if self.url is None:
             if self.server is None or self.axis is None:
@@ -138,10 +139,10 @@ class Where(NamedTuple):
         return server_for(self.url, self.server)
 
     async def drive(self, at: Remote) -> DriveSummary:
-        """The server's drive; one at a bus URL is put on its bench where it is not.
+        """The drive on the server; a drive at a bus URL is connected there if it is not yet.
 
         Raises:
-            NotAllowed: there is none, or several families would fit.
+            NotAllowed: there is none, or several families match.
         """
         if self.url is not None:
             return await at.drive(self.url, self.station, self.profile)
@@ -160,11 +161,10 @@ def measure(
     out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool,
     there: There | None = None,
 ) -> None:  # fmt: skip
-    """Measure by a server or ``here``, write and show the result.
+    """Measure by a server or by ``here``, then write and show the result.
 
-    ``there`` is what is done on the server with the result.
-
-    Ctrl+C ends the motion first: see `run_in_order`.
+    ``there`` is called after a measurement by a server, with its result. Ctrl+C ends the motion
+    first: see `run_in_order`.
     """
 
     async def work() -> None:

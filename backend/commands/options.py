@@ -1,4 +1,4 @@
-"""Options that several commands have, and which drive they mean."""
+"""Options that several commands have, and the drive that they denote."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import typer
 
 from drivers.urls import parse_url
 
-#: Where `servodeck demo` and `servodeck serve` listen unless set otherwise.
+#: Default address of `servodeck demo` and `servodeck serve`.
 DEFAULT_SERVER = "http://127.0.0.1:8420"
 
 Url = Annotated[str, typer.Argument(metavar="BUS_URL")]
@@ -25,7 +25,7 @@ Server = Annotated[
 
 
 class Place(NamedTuple):
-    """A drive on a bus; ``server`` is who is asked, None where the bus is opened here."""
+    """A drive on a bus; ``server``: address of the server to use, None to open the bus here."""
 
     url: str
     station: int
@@ -34,19 +34,19 @@ class Place(NamedTuple):
 
 
 def place(url: str, station: int, profile: str | None, server: str | None) -> Place:
-    """The drive that a command means.
+    """The drive that a command's options denote.
 
     Raises:
-        OutOfRange: no bus URL.
+        OutOfRange: not a bus URL.
     """
     return Place(url, station, profile, server_for(url, server))
 
 
 def server_for(url: str, server: str | None) -> str | None:
-    """The server to ask about a bus; None where the bus is opened here.
+    """Address of the server to use for a bus; None where the bus is opened here.
 
     Raises:
-        OutOfRange: no bus URL.
+        OutOfRange: not a bus URL.
     """
     virtual = parse_url(url).is_virtual
     return server or (DEFAULT_SERVER if virtual else None)

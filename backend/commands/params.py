@@ -1,4 +1,4 @@
-"""``servodeck params``: read, write, dump, compare and load parameters, here or by a server."""
+"""``servodeck params``: read, write, dump, compare, load parameters, direct or by a server."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ app = typer.Typer(help="Read and write parameters on a bus, or by a running serv
 
 
 class _Params(Protocol):
-    """`local_params` and `remote_params`."""
+    """Interface of `local_params` and `remote_params`."""
 
     async def get(self, place: Place, keys: list[str], *, as_json: bool) -> bool: ...
 
@@ -45,7 +45,7 @@ class _Params(Protocol):
 
 
 def _by(where: Place) -> _Params:
-    """Who does it."""
+    """The functions for a bus opened here, or those for a server."""
     return local_params if where.server is None else remote_params
 
 
@@ -155,7 +155,7 @@ def diff(
         where = place(url, station, profile, server)
         return await _by(where).diff(where, file, as_json=as_json)
 
-    # A script must not take a bus that is silent for a drive that differs.
+    # A script must be able to distinguish a bus without answer from a drive that differs.
     if run(work, error_code=2):
         raise typer.Exit(1)
 

@@ -38,7 +38,7 @@ def _with(config: Path | None, work: Callable[[Accounts], Awaitable[None]]) -> N
     async def doing() -> None:
         people = People(state_folder(config), accounts_needed=True)
         try:
-            # Who has the terminal of the machine may also begin again, on purpose.
+            # Whoever has access to the computer's terminal may deliberately set up accounts again.
             await people.open(recovering=True)
             await work(people.accounts)
             await people.mark()

@@ -1,4 +1,4 @@
-"""``servodeck preflight``: is this computer punctual enough, and what would help most."""
+"""``servodeck preflight``: check of the computer's timing, and the most effective remedy."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def preflight_command(
 
 
 def as_data(result: Preflight, language: Language) -> dict[str, object]:
-    """The result as JSON has it: codes and figures, and the words in one language."""
+    """The result as JSON values: codes and figures, with texts in one language."""
     return {
         "interface": result.interface,
         "facts": asdict(result.facts) | {"capabilities": sorted(result.facts.capabilities)},

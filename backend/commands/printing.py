@@ -1,4 +1,4 @@
-"""Words of the command line, in the language that was chosen for it."""
+"""Output of the command line, in its chosen language."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def print_text(code: str, /, **params: Param) -> None:
 
 
 def note(code: str, /, **params: Param) -> None:
-    """Print a message of the catalogue in addition to the output of the command."""
+    """Print a message of the catalogue on standard error."""
     print(words_of(code, **params), file=sys.stderr)
 
 
 def table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows in columns: names at the left of the first one, figures at the right of all others."""
+    """Rows as aligned lines: the first column to the left, all others to the right."""
     widths = [max(map(_columns, column)) for column in zip(*rows, strict=True)]
     lines = []
     for first, *rest in rows:
@@ -39,5 +39,5 @@ def table(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _columns(shown: str) -> int:
-    """Columns of a terminal that a text takes: Chinese characters are wide."""
+    """Width of a text in terminal columns; Chinese characters take two."""
     return sum(2 if east_asian_width(sign) in "WF" else 1 for sign in shown)

@@ -71,7 +71,7 @@ def show(
 
 @contextmanager
 def _importing() -> Iterator[None]:
-    """A description that cannot be used is an error as any other."""
+    """Convert errors of an unusable description file to NotAllowed."""
     try:
         yield
     except ImportFailed as error:

@@ -1,8 +1,8 @@
-"""A running server, asked from the command line as a page asks it.
+"""Requests from the command line to a running server, like those of a page.
 
 The wires of the demo bench belong to the server that made them, and an EtherCAT interface has one
-master: what runs already is asked. A drive is named as on a bus of one's own, by bus URL and
-station; where the server does not have it on its bench yet, it is put there.
+master, so a server that runs already is used. A drive is given by bus URL and station, as without a
+server; where it is not in the server's axis list yet, it is connected.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _TIMEOUT_S, _LOOK_S = 60.0, 0.1
 
 
 class Remote:
-    """One server. Its problems are raised as `DriveError` in its own words."""
+    """One server. Its problems are raised as `DriveError` with the server's text."""
 
     def __init__(self, address: str, http: httpx.AsyncClient) -> None:
         self.address = address
@@ -43,7 +43,7 @@ class Remote:
         """One request and its answer.
 
         Raises:
-            DriveError: what the server says, or that it cannot be reached.
+            DriveError: the server reports a problem, or cannot be reached.
         """
         answer = await self.raw(method, path, body=body, content=content, query=query)
         try:
@@ -62,7 +62,11 @@ class Remote:
         content: bytes | None = None,
         query: dict[str, str] | None = None,
     ) -> httpx.Response:
-        """One request, with ``body`` as JSON or ``content`` as it is; the answer as it came."""
+        """One request, with ``body`` as JSON or ``content`` as bytes; the unparsed response.
+
+        Raises:
+            DriveError: the server reports a problem, or cannot be reached.
+        """
         try:
             answer = await self._http.request(
                 method, path, json=body, content=content, params=query
@@ -76,10 +80,10 @@ class Remote:
         return answer
 
     async def result(self, path: str, body: object) -> dict[str, object]:
-        """Start a job and wait for its end; it is cancelled where the waiting is.
+        """Start a job and wait for its end; the job is cancelled where the caller is.
 
         Raises:
-            NotAllowed: it failed or was cancelled; the server's words.
+            NotAllowed: it failed or was cancelled; the message is the server's.
         """
         job = await self.ask("POST", path, JobInfo, body=body)
         try:
@@ -97,19 +101,19 @@ class Remote:
         return job.result or {}
 
     async def drives(self) -> list[DriveSummary]:
-        """Drives of the server's bench."""
+        """Drives of the server's axis list."""
         return await self.ask("GET", "/drives", list[DriveSummary])
 
     async def scan(self, url: str, stations: list[int] | None = None) -> list[FoundDrive]:
-        """What answers on a bus."""
+        """Drives that answer on a bus."""
         result = await self.result("/scan", {"url": url, "stations": stations})
         return TypeAdapter(list[FoundDrive]).validate_python(result["found"])
 
     async def drive(self, url: str, station: int, profile: str | None = None) -> DriveSummary:
-        """The drive at a station; put on the bench where it is not.
+        """The drive at a station; it is connected where it is not yet.
 
         Raises:
-            NotAllowed: nothing answers there, or several families would fit.
+            NotAllowed: no drive answers there, or several families match.
         """
         wanted = str(parse_url(url))
         for known in await self.drives():
@@ -130,9 +134,9 @@ class Remote:
 
     @asynccontextmanager
     async def exchange(self, url: str, cycle_us: int | None) -> AsyncIterator[None]:
-        """The bus exchanges process data inside the block; where it did before, it goes on after.
+        """Context in which the bus exchanges process data; an exchange from before continues after.
 
-        ``cycle_us`` None leaves everything as it is.
+        ``cycle_us``: cycle time [µs]; None leaves everything as it is.
         """
         buses = await self.ask("GET", "/buses", list[Bus])
         runs = any(bus.url == url and bus.cyclic is not None for bus in buses)
@@ -148,7 +152,7 @@ class Remote:
 
 @asynccontextmanager
 async def remote(server: str) -> AsyncIterator[Remote]:
-    """A server for the length of one command; ``SERVODECK_TOKEN`` is shown to it."""
+    """A server for the duration of one command, with the token of ``SERVODECK_TOKEN``."""
     address = server.rstrip("/")
     headers = {**authorisation(), "Accept-Language": language()}
     async with httpx.AsyncClient(
@@ -158,16 +162,16 @@ async def remote(server: str) -> AsyncIterator[Remote]:
 
 
 def _trust(address: str) -> bool | ssl.SSLContext:
-    """The certificates that a server is verified by.
+    """The certificates by which a server is verified.
 
-    To load the system's takes 50 ms. By ``http`` there is nothing to verify, and a server that
-    went on by ``https`` would be refused: this context trusts nobody.
+    Loading those of the system takes 50 ms. With ``http`` there is nothing to verify, so a context
+    without any certificate is used, which would refuse a redirection to ``https``.
     """
     return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if address.startswith("http://") else True
 
 
 def authorisation() -> dict[str, str]:
-    """The header of the token in the environment, if there is one."""
+    """The header with the token of the environment; empty without one."""
     token = os.environ.get("SERVODECK_TOKEN")
     return {"Authorization": f"Bearer {token}"} if token else {}
 

@@ -1,4 +1,4 @@
-"""``servodeck io``, ``faults`` and ``gear`` of a running server's drive."""
+"""``servodeck io``, ``faults`` and ``gear`` for a drive of a running server."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ async def terminals(place: Place) -> list[Terminal]:
 
 
 async def faults(place: Place) -> Faults:
-    """Active faults and the drive's own record, read now."""
+    """Active faults and the drive's own fault history, read now."""
     async with remote_drive(place) as (at, drive):
         here = f"/drives/{drive.id}"
         active = await at.ask("GET", f"{here}/faults", list[ActiveFault])
         history = await at.ask("GET", f"{here}/fault-history", FaultHistoryInfo)
         if history.kind == "selected":
-            # Records behind a selector are only read when somebody asks: it is a write.
+            # Records behind a selector are read only on request, as selecting is a write.
             history = await at.ask("POST", f"{here}/fault-history/read", FaultHistoryInfo)
     return Faults(
         active,
@@ -54,7 +54,7 @@ async def faults(place: Place) -> Faults:
 
 
 async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
-    """Plan the gear with the drive's encoder, and write it where that is wanted."""
+    """Plan the gear for the drive's encoder, and write it with ``write``."""
     body = mechanics.model_dump(mode="json")
     async with remote_drive(place) as (at, drive):
         here = f"/drives/{drive.id}/gear"

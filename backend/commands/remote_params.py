@@ -25,7 +25,7 @@ from drivers.errors import NotAllowed
 
 
 async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
-    """Read parameters and print them; whether all could be read."""
+    """Read parameters and print them; return whether all could be read."""
     async with remote_drive(place) as (at, drive):
         await at.result(f"/drives/{drive.id}/jobs/read_all", {"keys": keys})
         find = await _rows(at, drive)
@@ -51,7 +51,7 @@ async def save(place: Place) -> None:
 
 
 async def restore(place: Place, *, keep: bool) -> None:
-    """Restore what a motion left that was cut off, or let it stay as it is."""
+    """Restore values left by an interrupted motion or, with ``keep``, accept them."""
     async with remote_drive(place) as (at, drive):
         if not drive.pending_restores:
             print_text("printed.nothing-pending", drive=drive.name)
@@ -70,7 +70,7 @@ async def restore(place: Place, *, keep: bool) -> None:
 async def dump(
     place: Place, out: Path | None, *, author: str, notes: str, motor_individual: bool
 ) -> None:
-    """Read all settings; the set is kept in the server's library as well."""
+    """Read all settings; the set is stored in the server's library as well."""
     async with remote_drive(place) as (at, drive):
         name = f"{drive.id} {datetime.now(UTC):%Y-%m-%d %H.%M.%S}"
         body = {
@@ -90,7 +90,7 @@ async def dump(
 
 
 async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
-    """Print what differs; whether anything does."""
+    """Print the differences; return whether there are any."""
     async with remote_drive(place) as (at, drive):
         _, rows = await _differences(at, drive, file)
     values.show(rows, as_json=as_json)
@@ -98,7 +98,7 @@ async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
 
 
 async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> bool:
-    """Write what differs after it was shown; whether every value was kept."""
+    """Show the differences and write them; return whether the drive kept every value."""
     async with remote_drive(place) as (at, drive):
         kept, rows = await _differences(at, drive, file)
         keys = values.chosen(rows, yes=yes)
@@ -114,14 +114,14 @@ async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> boo
 
 
 async def scan(server: str, url: str) -> list[FoundDrive]:
-    """What answers on a bus of the server."""
+    """Drives that answer on a bus of the server."""
     async with remote(server) as at:
         return await at.scan(url)
 
 
 @asynccontextmanager
 async def remote_drive(place: Place) -> AsyncIterator[tuple[Remote, DriveSummary]]:
-    """The server, and its drive at this place."""
+    """The server, and its drive at this station."""
     assert place.server is not None
     async with remote(place.server) as at:
         yield at, await at.drive(place.url, place.station, place.profile)
@@ -130,7 +130,7 @@ async def remote_drive(place: Place) -> AsyncIterator[tuple[Remote, DriveSummary
 async def _differences(
     at: Remote, drive: DriveSummary, file: Path
 ) -> tuple[StoredSet, list[Compared]]:
-    """The set as the server keeps it from now on, and what is in it and not in the drive."""
+    """Store the set on the server, and compare it with the drive; both results."""
     data = values.bytes_of(file)
     content = parse(data, file.name)
     if content.profile != drive.profile:
@@ -153,7 +153,7 @@ async def _differences(
 
 
 async def _rows(at: Remote, drive: DriveSummary) -> Callable[[str], ParameterRow]:
-    """Finds a parameter by key or by the maker's number."""
+    """A function that finds a parameter by key or by the maker's number."""
     rows = await at.ask("GET", f"/drives/{drive.id}/parameters", list[ParameterRow])
     known = {row.number: row for row in rows if row.number} | {row.key: row for row in rows}
 

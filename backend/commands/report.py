@@ -1,4 +1,4 @@
-"""``servodeck report`` and ``servodeck recompute``: what stored measurements show, as files."""
+"""``servodeck report`` and ``servodeck recompute``: files from stored measurements."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _format(out: Path) -> Format:
 
 
 def _from_files(files: list[Path], form: Format, language: LanguageName, about: About) -> bytes:
-    """Of several files of a kind, the newest with the one before it."""
+    """A report from files; of several files of a kind, the newest and the one before it."""
     folders = {file.resolve().parent for file in files}
     if len(folders) != 1:
         raise NotAllowed("command.measurements-lie-different-folders")
@@ -127,7 +127,7 @@ def recompute(
                 "command.cannot-read", value=str(file), file=str(file), strerror=error.strerror
             ) from error
         found = unpack(data, file.name)
-        # The analysis takes seconds to import; no other command shall wait for it.
+        # Importing the analysis takes seconds, which other commands do not need.
         from backend.station.evaluation import evaluate
 
         made = evaluate(found)

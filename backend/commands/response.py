@@ -1,4 +1,4 @@
-"""``servodeck response import``: a response from a recording that another program made."""
+"""``servodeck response import``: a frequency response from a recording of another program."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ app = typer.Typer(
 
 
 class StructureName(StrEnum):
-    """What input and output are of the axis."""
+    """Relation of input and output to the axis."""
 
     unknown = "unknown"
     motor_speed = "motor_speed"

@@ -1,4 +1,4 @@
-"""Values that an earlier process left in a drive, as a command reports and restores them."""
+"""Values that an earlier process left in a drive, reported and restored by a command."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from drivers.errors import Busy, NotAllowed
 
 
 def recall(drive: Drive, url: str, station: int) -> Pending:
-    """Recall what is pending in this drive, say so, and keep its list from now on."""
+    """Load and report the pending restores of this drive, and keep its list from now on."""
     command = f"`{_name()}`"
     known = RestoreStore(state_folder(None), command).list_of(identity_of(drive), drive.id)
 
@@ -47,7 +47,7 @@ def recall(drive: Drive, url: str, station: int) -> Pending:
 
 
 async def restore_first(axis: Axis, pending: Pending) -> None:
-    """Before a motion: restore what nobody has changed since, as a server does by itself.
+    """Restore pending values that nobody has changed since, before a motion, as a server does.
 
     Raises:
         Busy: another process moves this drive now.
@@ -64,24 +64,24 @@ async def restore_first(axis: Axis, pending: Pending) -> None:
 
 
 async def stop_what_was_moved(axis: Axis, pending: Pending) -> None:
-    """Quick stop of an axis that a process moved which was killed a moment ago."""
+    """Send a quick stop where the axis was moved by a process that was killed a moment ago."""
     if pending.moved:
         axis.stop_pending = True
         await axis.require_stop_delivered()
 
 
 def require_own_values(drive: Drive) -> None:
-    """Temporary values must not be stored as the drive's own.
+    """Check that no restore is pending, as temporary values must not be saved in the drive.
 
     Raises:
-        NotAllowed: something is pending.
+        NotAllowed: a restore is pending.
     """
     if drive.pending_restores:
         raise NotAllowed("command.values-motion-cut-off", drive=drive.name, values=_values(drive))
 
 
 def show_restored(name: str, found: Mapping[str, object]) -> None:
-    """What `settle` did, line by line."""
+    """Print the result of `settle`, one line per value."""
     for what, code in (("back", "printed.restored"), ("left", "printed.not-restored")):
         values = found[what]
         for key, value in values.items() if isinstance(values, dict) else ():
@@ -93,6 +93,6 @@ def _values(drive: Drive) -> str:
 
 
 def _name() -> str:
-    """This command as it was called, without its arguments."""
+    """Name of this command as it was called, without its arguments."""
     words = [word for word in sys.argv[1:3] if not word.startswith("-") and word.isidentifier()]
     return " ".join(("servodeck", *words[:2]))

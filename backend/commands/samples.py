@@ -1,4 +1,4 @@
-"""Scope blocks of the live connection, decoded; `backend.api.live.messages` has the form."""
+"""Decoding of scope blocks of the live connection; format: `backend.api.live.messages`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.errors import ProtocolError
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Times [n] in s and values [n, k]; ``dropped`` samples were lost before them."""
+    """Times [n] in s and values [n, k]; ``dropped``: number of samples lost before them."""
 
     times_s: npt.NDArray[np.float64]
     values: npt.NDArray[np.float64]
@@ -25,7 +25,7 @@ def decode(frame: bytes) -> list[Samples]:
     """The blocks of one binary frame.
 
     Raises:
-        ProtocolError: these are no scope blocks.
+        ProtocolError: the frame does not consist of scope blocks.
     """
     blocks: list[Samples] = []
     at = 0
@@ -36,7 +36,7 @@ def decode(frame: bytes) -> list[Samples]:
 
 
 def _decode(frame: bytes, begin: int) -> tuple[Samples, int]:
-    """The block at ``begin``, and where the next one begins."""
+    """The block at ``begin``, and the offset of the next one."""
     try:
         magic, _sub, _seq, dropped, rows, columns, flags, t0_s, dt_s = HEADER.unpack_from(
             frame, begin

@@ -1,4 +1,4 @@
-"""``servodeck scales``: what a raw position and speed of a drive mean, and how a person says it."""
+"""``servodeck scales``: the scales of a drive's positions and speeds: show, state, teach."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ _UNITS = {"position": "rev", "velocity": "rpm", "acceleration": "rpm/s"}
 
 
 async def taught_file(drive: Drive, state: Path | None = None) -> Path:
-    """Where what is said of the drive at this place is kept, for commands without a server.
+    """File with the stated scales of a drive, for commands without a server.
 
-    By bus, station and serial number, so that another drive at the place has none of it.
+    Its name contains bus, station and serial number, so that another drive at the station does not
+    use it.
     """
     port = drive.ports[0]
     serial = await read_serial(drive)
@@ -49,12 +50,12 @@ async def taught_file(drive: Drive, state: Path | None = None) -> Path:
 
 
 async def take_taught(axis: Axis, state: Path | None = None) -> None:
-    """Let the axis know what was said of it."""
+    """Set the scales of the axis that were stated earlier."""
     path = await taught_file(axis.drive, state)
     try:
         axis.teach(Taught.model_validate_json(path.read_text("utf-8")))
     except (OSError, ValidationError):
-        # Nothing (readable) is kept: the drive, its file and its manual count.
+        # There is no readable file: the drive, its description file and its manual count.
         axis.teach(None)
 
 
@@ -221,12 +222,12 @@ async def _teach_here(
 
 
 def _farther(increments: int, most: int) -> int:
-    """Ten times as far the same way; a move may have arrived an increment short of that."""
+    """Increments of the next move: ten times as far in the same direction, at most ``most``."""
     return int(math.copysign(min(10 * abs(increments), most), increments))
 
 
 def _turned(increments: int) -> float | None:
-    """How far the shaft turned as a person saw it; None: too little to decide, move further."""
+    """Revolutions of the shaft as a person saw them; None: too few to decide, move further."""
     question = words_of("printed.how-far", increments=increments)
     answer = str(typer.prompt(question, default="", show_default=False))
     return float(answer.replace(",", ".")) if answer.strip() else None

@@ -1,4 +1,4 @@
-"""``servodeck scan``: what answers on a bus."""
+"""``servodeck scan``: search for drives on a bus."""
 
 from __future__ import annotations
 
@@ -50,9 +50,9 @@ _FOUND = {
 
 
 async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], dict[str, str]]]:
-    """What answers, and the profiles that fit with how sure that is."""
+    """Drives that answer, each with the matching profiles and their confidence."""
     if at := server_for(url, server):
-        # The messages of the interface take longer to import than the rest.
+        # The models of the API take longer to import than the rest.
         from backend.commands import remote_params
 
         return [
@@ -70,7 +70,7 @@ async def _found(url: str, server: str | None) -> list[tuple[dict[str, object], 
 
 
 def _row(found: Found) -> dict[str, object]:
-    """As the server answers it, with the words of the command's language."""
+    """A found drive in the form of the server's answer, with texts in the command's language."""
     return {name: getattr(found, name) for name in _FOUND} | {
         "state": "" if found.state is None else found.state.words(language()),
         "notes": [note.words(language()) for note in found.notes],

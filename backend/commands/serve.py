@@ -1,4 +1,4 @@
-"""Starting the server: who may come in, the socket, the certificate, and the shutdown."""
+"""Start of the server: access, socket, certificate and shutdown."""
 
 from __future__ import annotations
 
@@ -36,27 +36,29 @@ from profiles import load_all
 from profiles.loader import ProfileError
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "[::1]"})
-#: Messages of the page are small; what is larger is an attack or a defect.
+#: Largest message of a page, whose messages are small; a larger one is an attack or a defect.
 WS_MAX_BYTES = 64 << 10
-#: A line that is dead but not closed (lid shut, cable pulled) is given up after both together.
-#: Control, jog and enabling button do not wait for that: they end by their own silence.
+#: Period of pings, and timeout of their answers [s]. A connection that is dead but not closed (lid
+#: shut, cable pulled) ends after both together. Control, jog and enabling button end earlier, by
+#: their own timeouts.
 PING_S, PONG_S = 5.0, 10.0
-#: Connections that the system keeps until they are accepted; the system bounds it too. One that
-#: finds no room tries again after a second.
+#: Connections that the system holds until they are accepted; the system has its own limit as well.
+#: A client that finds no room tries again after a second.
 BACKLOG = 2048
-#: Files and connections at once: what a process may have at first is often a thousand.
+#: Open files and connections; the default limit of a process is often a thousand.
 DESCRIPTORS = 8192
 
 
-#: What the start leaves out, so that the page is there sooner, and loads behind it.
+#: Modules that are imported only after the start, so that the page is available sooner.
 LATE = (*libraries.COMPUTING, "backend.report.pdf")
 
 
 @dataclass(frozen=True, slots=True)
 class Serving:
-    """How to serve. ``accounts`` None: where there are accounts, or the address is not loopback.
+    """Settings of the server.
 
-    ``behind`` are host names of a proxy or tunnel in front, which ends TLS itself.
+    ``accounts``: None requires a login where accounts exist or the address is not loopback.
+    ``behind``: host names of a proxy or tunnel in front, which terminates TLS itself.
     """
 
     host: str = "127.0.0.1"
@@ -69,21 +71,21 @@ class Serving:
 
     @property
     def on_loopback(self) -> bool:
-        """Only this machine reaches it."""
+        """Whether only this computer can reach the server."""
         return self.host in LOOPBACK or self.host == "::1"
 
 
 async def serve(
     bench: Bench, serving: Serving, ready: Callable[[], Awaitable[object]] | None = None
 ) -> None:
-    """Serve until interrupted. Port 0 takes a free one; the address is printed.
+    """Serve until interrupted. Port 0 takes a free port; the address is printed.
 
     ``ready`` is awaited once the server answers, before the address is printed.
 
     Raises:
         Busy: another server uses the state folder.
-        NotAllowed: the port is in use, the certificate is none, or others could come in without
-            an account.
+        NotAllowed: the port is in use, the certificate is not valid, or others could have access
+            without an account.
     """
     bench.records.claim()
     try:
@@ -125,8 +127,9 @@ async def _serve_claimed(
 
 
 def _box(folder: Path) -> Box | None:
-    """Name and ports of the station. One that cannot be read keeps no server from its work: where
-    it matters, EtherCAT is refused.
+    """Name and ports of the station; None where the file is missing or cannot be read.
+
+    An unreadable file does not prevent the start: opening EtherCAT is refused where it matters.
     """
     try:
         return read(folder)
@@ -153,15 +156,15 @@ def _known_by_name(
     return announced(box, addresses, port, failed)
 
 
-#: After this time [s] a thread that computes lets the event loop go on. STOP asks for its turn some
-#: twenty times on its way, and a thread that reads a file holds it up each time (Python: 5 ms).
+#: Time [s] after which a computing thread yields to the event loop. STOP needs the interpreter some
+#: twenty times, and a thread that reads a file delays it each time (Python's default: 5 ms).
 _SWITCH_S = 0.0005
 
 
 async def settle() -> None:
-    """What a first request would wait for otherwise, and every later one again and again."""
+    """Load profiles and libraries and tune the interpreter, so that requests do not wait for it."""
     sys.setswitchinterval(_SWITCH_S)
-    # One that cannot be read is reported where it is asked for, and keeps no server from its work.
+    # A profile that cannot be read is reported where it is used, and does not stop the server.
     with contextlib.suppress(ProfileError, OSError, UnicodeDecodeError):
         await asyncio.to_thread(load_all)
     await asyncio.to_thread(libraries.load, LATE)
@@ -172,9 +175,9 @@ async def accounts_needed(folder: Path, serving: Serving) -> bool:
     """Whether people must log in.
 
     Raises:
-        NotAllowed: they would not have to where others could reach the server.
-        AccountsMissing: they have had to, and there are no accounts any more.
-        DatabaseFailed: it cannot be known.
+        NotAllowed: no login was requested although others could reach the server.
+        AccountsMissing: a login was required before, and there are no accounts any more.
+        DatabaseFailed: the accounts cannot be read.
     """
     reachable = not serving.on_loopback or bool(serving.behind)
     if reachable and serving.accounts is False:
@@ -237,7 +240,7 @@ def _config(
         backlog=BACKLOG,
         timeout_graceful_shutdown=3,
         server_header=False,
-        # Who a proxy speaks for is trusted only where one was announced.
+        # Proxy headers are trusted only where a proxy was configured.
         proxy_headers=bool(serving.behind),
         ssl_certfile=None if certificate is None else str(certificate.certificate),
         ssl_keyfile=None if certificate is None else str(certificate.key),
@@ -273,9 +276,7 @@ def _print_addresses(shown: str, people: People, certificate: Certificate | None
 
 
 def _print_problems(bench: Bench) -> None:
-    """What is wrong with the station and not with a drive, such as a database out of reach: what
-    was so at the start, and what becomes so.
-    """
+    """Print problems of the station itself, such as a database out of reach, present and later."""
 
     def tell(entry: Entry) -> None:
         if entry.level == "error" and entry.drive is None:
@@ -288,7 +289,7 @@ def _print_problems(bench: Bench) -> None:
 
 def _listen(host: str, port: int) -> AcceptingSocket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # With the protocol named: only then does asyncio send small answers without waiting for more.
+    # With the protocol given, asyncio disables Nagle's algorithm, so small answers are not delayed.
     listening = AcceptingSocket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -1,4 +1,4 @@
-"""A drive on a bus for the length of one command, without the server."""
+"""A drive on a bus for the duration of one command, without a server."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 @contextmanager
 def reported(code: int = 1) -> Iterator[None]:
-    """What a user can mend becomes one readable message and this exit code."""
+    """Report errors that a user can correct as one message, and exit with this code."""
     try:
         yield
     except DriveError as error:
@@ -75,11 +75,11 @@ def _run(work: Callable[[], Awaitable[T]], error_code: int = 1) -> T:
 
 
 def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
-    """Run what moves an axis: Ctrl+C and SIGTERM let it put everything back first; exit code 130.
+    """Run a command that moves an axis; Ctrl+C and SIGTERM restore values first, exit code 130.
 
-    What the drive was changed for a measurement is restored while the work is cancelled.
+    Values that a measurement has changed are restored while the work is cancelled.
     """
-    # The event loop makes a cancelling of SIGINT alone, and only where that is not ignored.
+    # The event loop turns only SIGINT into a cancellation, and only where it is not ignored.
     with signals.interruptible():
         try:
             return _run(work)
@@ -89,15 +89,15 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
 
 
 def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:
-    """Run it; Ctrl+C and a service manager's end (SIGTERM) are both orderly."""
+    """Run work until Ctrl+C or SIGTERM of a service manager, both of which end it cleanly."""
     signals.termination_interrupts()
-    # uvicorn has already shut down in order when the interrupt arrives here.
+    # uvicorn has already shut down when the interrupt arrives here.
     with contextlib.suppress(KeyboardInterrupt):
         _run(work)
 
 
 def reporting_errors(command: Callable[P, T]) -> Callable[P, T]:
-    """A command whose errors are `reported`."""
+    """Decorator: the errors of a command are `reported`."""
 
     @functools.wraps(command)
     def body(*arguments: P.args, **named: P.kwargs) -> T:
@@ -108,7 +108,7 @@ def reporting_errors(command: Callable[P, T]) -> Callable[P, T]:
 
 
 def show_progress(fraction: float, step: Text | str) -> None:
-    """A line that overwrites itself, on a terminal only."""
+    """Show progress as a line that overwrites itself, on a terminal only."""
     if sys.stderr.isatty():
         end = "\n" if fraction >= 1 else ""
         shown = step if isinstance(step, str) else step.words(language())
@@ -123,7 +123,7 @@ def progress() -> Progress:
 
 @asynccontextmanager
 async def opened(url: str) -> AsyncIterator[Link]:
-    """The bus, closed afterwards."""
+    """The opened bus; closed afterwards."""
     link = link_for(url)
     await link.open()
     try:
@@ -134,12 +134,12 @@ async def opened(url: str) -> AsyncIterator[Link]:
 
 @asynccontextmanager
 async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator[Drive]:
-    """A drive on a bus. Without ``profile`` it is recognised, or the choices are named.
+    """A drive on a bus. Without ``profile`` its family is recognised.
 
-    What an earlier process left pending in it is reported on standard error.
+    Restores that an earlier process left pending in it are reported on standard error.
 
     Raises:
-        NotAllowed: nothing answers, or several families would fit.
+        NotAllowed: no drive answers, or several families match; the message names them.
     """
     async with drive_and_pending(url, station, profile) as (drive, _pending):
         yield drive
@@ -149,10 +149,10 @@ async def drive_at(url: str, station: int, profile: str | None) -> AsyncIterator
 async def drive_and_pending(
     url: str, station: int, profile: str | None
 ) -> AsyncIterator[tuple[Drive, Pending]]:
-    """As `drive_at`, with what is pending in the drive.
+    """As `drive_at`, with the pending restores of the drive.
 
     Raises:
-        NotAllowed: nothing answers, or several families would fit.
+        NotAllowed: no drive answers, or several families match.
     """
     async with opened(url) as link:
         yield await drive_on(link, url, station, profile)
@@ -161,10 +161,10 @@ async def drive_and_pending(
 async def drive_on(
     link: Link, url: str, station: int, profile: str | None
 ) -> tuple[Drive, Pending]:
-    """A drive on an open bus, with what is pending in it.
+    """A drive on an open bus, with its pending restores.
 
     Raises:
-        NotAllowed: nothing answers, or several families would fit.
+        NotAllowed: no drive answers, or several families match.
     """
     seen = await link.scan(show_progress, [station])
     found = next((f for f in seen if f.station == station), None)

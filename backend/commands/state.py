@@ -1,4 +1,4 @@
-"""Where a station keeps what it keeps."""
+"""The state folder of a station."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ STATE_FOLDER_VARIABLE = "SERVODECK_CONFIG"
 
 
 def state_folder(chosen: Path | None) -> Path:
-    """Where the list of drives, the parameter sets and the restore lists are kept.
+    """Folder of the list of drives, the parameter sets and the restore lists.
 
-    The environment's SERVODECK_CONFIG is used where no folder is given, so that server and
-    commands of one station share it.
+    Where no folder is given, the environment variable SERVODECK_CONFIG is used, so that server and
+    commands of one station share the folder.
 
     Raises:
         StateRefused: a newer servodeck has written it.
@@ -27,6 +27,6 @@ def state_folder(chosen: Path | None) -> Path:
 
 
 def chosen_folder(chosen: Path | None) -> Path:
-    """The same folder, whoever has written it: for a restore that replaces it."""
+    """The same folder without a check of its version, for a restore that replaces it."""
     named = os.environ.get(STATE_FOLDER_VARIABLE)
     return chosen or Path(named or platformdirs.user_data_dir("servodeck"))

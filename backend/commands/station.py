@@ -1,4 +1,4 @@
-"""``servodeck station``: what a computer needs that runs servodeck as a service."""
+"""``servodeck station``: set-up of a computer that runs servodeck as a service."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Commands of the tools: on a bus of one's own, or by a running server."""
+"""Commands of the tools, on a bus that the command opens or by a running server."""
 
 from __future__ import annotations
 
@@ -38,11 +38,12 @@ _OUTPUT: dict[str, tuple[Any, object]] = {"out": (measure.Out, None), "as_json":
 
 @dataclass(frozen=True)
 class CommandExtras:
-    """What the command of a tool has extras what follows from its descriptor.
+    """Additions to the command of a tool, beyond those that follow from its descriptor.
 
-    ``options`` are further ones, or take the place of a setting's. ``settled`` makes the settings
-    of what was given. ``here`` and ``there`` are done with the result, on a bus of one's own or on
-    the server; ``lines`` say so.
+    ``options``: further options, or replacements for those of settings. ``settled`` returns the
+    settings from the given options. ``here`` and ``there`` are called with the result, after a
+    measurement by the command itself or by the server; ``lines`` returns additional lines of
+    output.
     """
 
     options: Mapping[str, tuple[Any, object]]
@@ -53,7 +54,7 @@ class CommandExtras:
 
 
 def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[..., None]:
-    """The command of a tool: where the drive is, an option for each setting, and the output."""
+    """The command of a tool, with options for the drive, for each setting and for the output."""
     own = {**_WHERE, **dict(_options(tool)), **(extras.options if extras else {}), **_OUTPUT}
 
     def command(**given: Any) -> None:
@@ -100,7 +101,7 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
         )  # fmt: skip
 
     command.__name__, command.__doc__ = tool.kind, tool.text("help")
-    # What typer reads options from; the settings are written down once, in the tool.
+    # typer reads the options from the signature; the settings are defined once, in the tool.
     only = inspect.Parameter.KEYWORD_ONLY
     command.__dict__["__signature__"] = inspect.Signature(
         [
@@ -113,7 +114,7 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
 
 
 def lines_of(tool: AnyTool, result: ToolResult) -> list[str]:
-    """What a person is shown of a result."""
+    """A result as lines of text."""
     section = tool.report(result.in_language(language()))
     lines = [tool.text(note.name, language(), note.values) for note in section.notes]
     lines += [
@@ -135,7 +136,7 @@ def _shown(row: Row) -> str:
 
 
 def _options(tool: AnyTool) -> Iterator[tuple[str, tuple[Any, object]]]:
-    """Each setting as an option; a pair as two of them."""
+    """Each setting as an option; a pair of values as two options."""
     for name, field in tool.settings.model_fields.items():
         option = next((each for each in field.metadata if isinstance(each, Option)), Option())
         names = option.names or (f"--{name.replace('_', '-')}",)
@@ -149,7 +150,7 @@ def _options(tool: AnyTool) -> Iterator[tuple[str, tuple[Any, object]]]:
 
 
 def _kind(tool: AnyTool, name: str, field: FieldInfo, *, pair: bool) -> Any:
-    """The type of an option: text of a choice, a number, or a switch."""
+    """The type of an option: a choice, a number, a text or a switch."""
     kind = field.annotation
     if pair:
         return float | None
@@ -160,10 +161,10 @@ def _kind(tool: AnyTool, name: str, field: FieldInfo, *, pair: bool) -> Any:
 
 
 def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
-    """The settings of these options.
+    """The settings from the given options.
 
     Raises:
-        typer.BadParameter: a value is outside what it may be, or half of a pair is missing.
+        typer.BadParameter: a value is outside its limits, or one of a pair is missing.
     """
     values: dict[str, object] = {}
     for name, field in tool.settings.model_fields.items():

@@ -1,4 +1,4 @@
-"""``servodeck autotune``: from an unknown axis to a verified one, without the page."""
+"""``servodeck autotune``: measurement, design and verification of gains, without the page."""
 
 from __future__ import annotations
 

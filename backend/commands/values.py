@@ -1,4 +1,4 @@
-"""What `servodeck params` takes and prints, of a drive on a bus here or of a server's drive."""
+"""Input and output of `servodeck params`, for a drive on a bus or of a server."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from profiles.schema import Raw
 
 
 def print_missing(data: bytes) -> None:
-    """Say on standard error which settings a set that was just made lacks."""
+    """Print on standard error which settings are missing in a new set."""
     missing = without(parameter_set.parse(data).not_read)
     if missing:
         typer.echo(f"the set is{missing}", err=True)
 
 
 class Described(Protocol):
-    """What is known of a parameter."""
+    """Description of a parameter, from a profile or a server."""
 
     @property
     def key(self) -> str:
@@ -45,31 +45,31 @@ class Described(Protocol):
 
     @property
     def enum(self) -> Mapping[int, str]:
-        """Words of its values."""
+        """Texts of its values."""
 
     @property
     def bits(self) -> Mapping[str, str]:
-        """Words of its bits."""
+        """Texts of its bits."""
 
 
 class Reported(Protocol):
-    """What a drive said of it; ``raw`` is None where ``error`` states the reason."""
+    """Reading of a parameter; ``raw`` is None where ``error`` states the reason."""
 
     @property
     def raw(self) -> Raw | None:
-        """As on the wire."""
+        """Raw value."""
 
     @property
     def value(self) -> Raw | None:
-        """In the parameter's unit."""
+        """Value in the parameter's unit."""
 
     @property
     def error(self) -> str:
-        """Why there is none, or empty."""
+        """Why there is no value; empty where there is one."""
 
 
 class Compared(NamedTuple):
-    """One row of a set next to the drive."""
+    """One row of the comparison of a set with a drive."""
 
     key: str
     name: str
@@ -84,15 +84,15 @@ class Compared(NamedTuple):
 
     @property
     def differs(self) -> bool:
-        """The drive has another value."""
+        """Whether the drive has another value."""
         return self.status == "differs"
 
 
 D = TypeVar("D", bound=Described)
 
-#: The widest word with bits: a negative one is reported as it is on the wire.
+#: Mask of the widest value with bits, so that a negative one is shown as its bit pattern.
 _WIDEST = 0xFFFF_FFFF
-#: What a row of a comparison is, where its values do not differ.
+#: Message codes of the status of a row in a comparison.
 _STATUS = {
     "differs": "printed.row-differs",
     "same": "printed.row-same",
@@ -105,10 +105,10 @@ _STATUS = {
 
 
 def finite(key: str, name: str, text: str) -> float:
-    """The number that is meant for a parameter.
+    """The number that a text gives for a parameter.
 
     Raises:
-        NotAllowed: it is none, or has no end.
+        NotAllowed: it is not a number, or not finite.
     """
     try:
         number = float(text)
@@ -120,10 +120,10 @@ def finite(key: str, name: str, text: str) -> float:
 
 
 def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
-    """``KEY=VALUE`` as it is typed.
+    """Parameter and value of ``KEY=VALUE`` as typed.
 
     Raises:
-        NotAllowed: no assignment, no such parameter, or no number where one is needed.
+        NotAllowed: not an assignment, no such parameter, or not a number where one is needed.
     """
     key, separator, value = text.partition("=")
     if not separator:
@@ -138,7 +138,7 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
 
 
 def line(parameter: Described, reported: Reported) -> str:
-    """A parameter and its value."""
+    """A parameter and its value as a line of text."""
     if reported.raw is None:
         return (
             f"{parameter.key}  {parameter.name}: {reported.error or words_of('printed.not-read')}"
@@ -151,7 +151,7 @@ def line(parameter: Described, reported: Reported) -> str:
 
 
 def show_readings(read: Iterable[tuple[Described, Reported]], *, as_json: bool) -> bool:
-    """Print parameters with their values; whether each has one."""
+    """Print parameters with their values; return whether each has one."""
     rows = list(read)
     if as_json:
         print(json.dumps([_row(parameter, reported) for parameter, reported in rows], indent=1))
@@ -184,7 +184,7 @@ def _in_unit(raw: Raw | None, value: Raw | None, unit: str) -> str:
 
 
 def bytes_of(file: Path) -> bytes:
-    """What a file of the command line holds.
+    """Contents of a file given on the command line.
 
     Raises:
         NotAllowed: it cannot be read.
@@ -218,10 +218,10 @@ def show(rows: Iterable[Compared], *, as_json: bool = False) -> None:
 
 
 def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
-    """Keys that are to be written, after they were shown and confirmed; none where nothing is.
+    """Show the differences, ask for confirmation and return the keys to write; may be empty.
 
     Raises:
-        NotAllowed: the person said no.
+        NotAllowed: the person declined.
     """
     rows = list(rows)
     show(rows)
@@ -234,7 +234,7 @@ def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
 
 
 def loaded(result: Mapping[str, object]) -> bool:
-    """Report what a load did; whether every value was kept."""
+    """Print the result of a load; return whether the drive kept every value."""
     print_text("printed.set-loaded", written=str(result["written"]), failed=str(result["failed"]))
     print_text("printed.values-before", file=str(result["backup"]))
     return result["failed"] == 0

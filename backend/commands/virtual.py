@@ -61,7 +61,7 @@ def virtual(
 
 
 def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
-    """The bench of `virtual`; its errors are about the command line, not about a file."""
+    """The bench of `virtual`; its errors do not name the temporary bench file."""
     try:
         return DemoBench(file, folder, nvm)
     except NotAllowed as error:

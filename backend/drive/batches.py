@@ -1,4 +1,4 @@
-"""Asking a drive for many parameters, until it leaves too many without an answer."""
+"""Reading many parameters of a drive, until too many requests in a row time out."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from backend.drive.ports import Port, address_of
 from drivers.errors import DriveError, LinkTimeout, NotAsked
 from profiles.schema import Parameter
 
-#: A drive that left so many objects in a row without an answer, in two batches at least, is asked
-#: for nothing more of a list.
+#: Number of consecutive objects without an answer, in at least two batches, after which the rest
+#: of a list is not requested.
 _SILENT_OBJECTS = 64
 
 Answers = Sequence[bytes | DriveError]
@@ -19,10 +19,10 @@ Answers = Sequence[bytes | DriveError]
 async def asked_in_batches(
     port: Port, parameters: Sequence[Parameter], access: ExclusiveAccess
 ) -> AsyncIterator[tuple[Sequence[Parameter], Answers]]:
-    """Parameters with what came of asking for each, in batches.
+    """Read parameters in batches; yields each batch with one answer or error per parameter.
 
-    A drive that leaves several batches in a row without an answer is not asked for the access. What
-    the link left out because the drive was slow comes once more at the end.
+    After several batches in a row without an answer, the rest is not requested. Parameters that the
+    link left out because the drive was slow are yielded once more at the end.
 
     Raises:
         LinkLost: the bus is gone.
@@ -51,5 +51,5 @@ async def _ask(port: Port, chunk: Sequence[Parameter], access: ExclusiveAccess) 
 
 
 def _silence(answers: Answers) -> bool:
-    """Whether nothing of a batch was answered; one object alone shows nothing."""
+    """Whether no object of a batch was answered; False for a batch of one object."""
     return len(answers) > 1 and all(isinstance(answer, LinkTimeout) for answer in answers)

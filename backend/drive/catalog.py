@@ -1,7 +1,7 @@
-"""What a drive's functions consist of, completed from the objects of CiA 402 where it has them.
+"""Functions of a drive: those of its profile, completed from the standard objects of CiA 402.
 
-A profile's own description goes first. Drives that were imported from a description file have
-none, and still get the pages that the standard objects make possible.
+A profile's own description has priority. Drives imported from a description file have none, and
+still get the pages that the standard objects make possible.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MODULO = ("607B:01", "607B:02", "60F2:00")
 
 
 def functions_of(profile: Profile) -> Functions:
-    """The profile's functions with what the standard objects add."""
+    """The profile's functions, completed from the standard objects."""
     own = profile.functions
     pages = {(group.page, group.name) for group in own.groups}
     groups = list(own.groups)
@@ -43,7 +43,7 @@ def functions_of(profile: Profile) -> Functions:
 
 
 def _error_field(profile: Profile) -> FaultHistory | None:
-    """1003h, newest first in subindex 1; the low word is the code (CiA 301 clause 7.5.2.4)."""
+    """Fault history in 1003h, newest in subindex 1; low word: code (CiA 301 clause 7.5.2.4)."""
     keys = [f"1003:{sub:02X}" for sub in range(1, 0xFF) if f"1003:{sub:02X}" in profile.by_key]
     if not keys:
         return None
@@ -56,7 +56,7 @@ def _error_field(profile: Profile) -> FaultHistory | None:
 
 
 def _standard_probe(profile: Profile) -> TouchProbe | None:
-    """60B8h to 60BDh (CiA 402-2 clause 8.10); what the source bits mean is the maker's."""
+    """Touch probes of 60B8h to 60BDh (CiA 402-2 clause 8.10); the maker defines the source bits."""
     if not {"60B8:00", "60B9:00"} <= profile.by_key.keys():
         return None
 

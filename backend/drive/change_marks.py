@@ -1,4 +1,4 @@
-"""What was changed in a drive since its memory was last written, and what waits to act."""
+"""Marks of changed parameters: not yet saved in the drive's memory, or not yet in effect."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ from profiles.schema import Raw
 
 @dataclass(slots=True)
 class ChangeMarks:
-    """``stored`` is what the drive's memory holds of what was changed: raw values by key.
+    """Change marks of one drive.
 
-    ``pending`` are keys that wait for something before they act, and for what.
+    ``stored``: raw values in the drive's non-volatile memory, by key, for changed parameters.
+    ``pending``: keys of parameters that are not in effect yet, each with the action it waits for.
     """
 
     stored: dict[str, Raw] = field(default_factory=dict)
@@ -28,11 +29,14 @@ class ChangeMarks:
         )
 
     def applied(self, *what: str) -> None:
-        """What waited for one of ``what`` (write_settings, reenable, power_cycle) acts now."""
+        """Clear the pending marks that wait for one of ``what``.
+
+        One of: write_settings, reenable, power_cycle.
+        """
         for key in [key for key, until in self.pending.items() if until in what]:
             del self.pending[key]
 
     def forget(self) -> None:
-        """The drive restarted: what it holds is what its memory held."""
+        """Clear all marks, as the drive restarted with the values of its memory."""
         self.stored.clear()
         self.pending.clear()

@@ -1,8 +1,8 @@
 """A drive: a profile, the ports it is reached through, and typed reads and writes.
 
 Engineering values are ``raw * scale + offset`` of the parameter. A write is checked on the host
-before a byte leaves (access, type, range, enum, state), then written, then read back: what
-counts is the value that came back.
+before it is sent (access, type, range, enum, state), then sent, then read back; the value read back
+is the result.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ _POWERED = frozenset(
 
 
 class Drive(ReadableDrive):
-    """One drive of the bench: reads, and writes that are checked, granted and read back."""
+    """One connected drive: reads, and writes that are checked, granted and read back."""
 
     def check(self, parameter: Parameter, raw: Raw) -> Raw:
-        """A raw value as it will be written.
+        """Check a raw value and return it as it will be written.
 
         Raises:
             NotAllowed, OutOfRange: as `backend.drive.value_check.checked`.
@@ -56,8 +56,8 @@ class Drive(ReadableDrive):
         ``value`` is a raw value, or one in the parameter's unit with ``raw=False``.
 
         Raises:
-            NotGranted: it can put energy into the motor; the error says where that is done.
-            NotAllowed, OutOfRange: nothing was sent.
+            NotGranted: the object can energise the motor; the message states where that is done.
+            NotAllowed, OutOfRange: the write was refused by the host; nothing was sent.
             Rejected: the drive refused.
             LinkTimeout: the outcome is unknown, and reading back failed as well.
         """
@@ -66,7 +66,7 @@ class Drive(ReadableDrive):
         return await self._written(parameter, value)
 
     def check_write(self, key: str, value: Raw, *, raw: bool = True) -> tuple[Parameter, Raw]:
-        """What `write` refuses by the profile, before a byte leaves; the parameter and raw value.
+        """Check by the profile what `write` would refuse; return the parameter and the raw value.
 
         Raises:
             NotGranted, NotAllowed, OutOfRange: as `write`.
@@ -75,7 +75,7 @@ class Drive(ReadableDrive):
         return self._to_be_written(key, value, raw=raw)
 
     async def energise(self, key: str, raw: Raw, grant: Grant) -> Reading:
-        """Like `write`, of a raw value to an object that can put energy into the motor.
+        """Like `write`, for a raw value of an object that can energise the motor.
 
         Raises:
             NotGranted: the grant is not for this object, or has ended.
@@ -90,10 +90,10 @@ class Drive(ReadableDrive):
         return await self._written(parameter, raw, permitted)
 
     async def put_back(self, key: str, raw: Raw) -> Reading:
-        """Write a temporary value back, of whatever class, by the work that had changed it.
+        """Restore a temporary value, of any motion class, for the work that changed it.
 
         Raises:
-            NotGranted: it energises, and the calling work holds no grant.
+            NotGranted: the object can energise the motor, and the calling work holds no grant.
             DriveError: as `write`.
         """
         if motion_of(self.parameter(key)) != "energises":
@@ -101,7 +101,7 @@ class Drive(ReadableDrive):
         return await self.energise(key, raw, self.authority.require_held(self.id, self.name, key))
 
     def require_grant(self, grant: Grant, key: str, *, restores: bool = False) -> None:
-        """This grant permits to write this object now.
+        """Check that this grant permits writing this object now.
 
         Raises:
             NotGranted: it does not.
@@ -123,7 +123,7 @@ class Drive(ReadableDrive):
         return parameter, self.check(parameter, value)
 
     def _refuse_energising(self, key: str, value: Raw) -> None:
-        """Raises NotGranted where this object can put energy into the motor, whatever the value."""
+        """Raise NotGranted where this object can energise the motor, whatever the value."""
         parameter = self.parameter(key)
         if motion_of(parameter) != "energises":
             return
@@ -133,15 +133,15 @@ class Drive(ReadableDrive):
         raise error
 
     async def _require_harmless(self, parameter: Parameter) -> None:
-        """Writing it changes no motion that goes on, and nothing of an axis with power.
+        """Check that a motion relying on this parameter is neither under way nor possible.
 
         Raises:
-            NotAllowed: the axis is enabled or moved, and a motion relies on it.
+            NotAllowed: a motion relies on the parameter, and the axis is moved or has power.
         """
         if not held_still(parameter):
             return
         if self.authority.held(self.id) is not None:
-            return  # changed for the length of a motion, by the motion itself
+            return  # the motion itself changes it for its duration
         if (mover := self.authority.mover_of(self.id)) is not None:
             by = f" by {mover.actor}" if mover.actor else ""
             raise NotAllowed(
@@ -157,7 +157,7 @@ class Drive(ReadableDrive):
     async def _written(
         self, parameter: Parameter, value: Raw, permitted: Callable[[], None] = lambda: None
     ) -> Reading:
-        """``permitted`` raises where it may not be sent; asked once more at the last moment."""
+        """Write and read back; ``permitted`` is called just before sending and may raise."""
         port = self.port_for(parameter)
         if parameter.settable == "stopped":
             await self._require_no_power(parameter)
@@ -178,8 +178,9 @@ class Drive(ReadableDrive):
         self, port: Port, parameter: Parameter, value: Raw, permitted: Callable[[], None]
     ) -> Reading:
         async with self.exclusive.asking():
-            # STOP may have ended the grant while something was read, or the drive was left alone:
-            # nothing is awaited between this and the link, which keeps the order of writes.
+            # STOP may have ended the grant during a read, or while another task had exclusive
+            # access. Nothing is awaited between this check and the link, which keeps the order of
+            # writes.
             permitted()
             return await self._sent_and_read(port, parameter, value)
 
@@ -214,10 +215,10 @@ class Drive(ReadableDrive):
         self.listeners.wrote(record)
 
     def require_identity(self) -> None:
-        """The drive at this place is the one that was connected.
+        """Check that the drive at this station is the one that was connected.
 
         Raises:
-            NotAllowed: another one answers, and nobody has accepted it.
+            NotAllowed: another drive answers, and nobody has accepted it.
         """
         if self.identity_warning is not None:
             raise NotAllowed(
@@ -237,7 +238,7 @@ class Drive(ReadableDrive):
         await self._sent(parameter, raw)
 
     async def relax(self, key: str, raw: int) -> None:
-        """Write what only ends motion or takes power away, without reading back or a grant.
+        """Write a value that only ends motion or removes power, without reading back or a grant.
 
         Raises:
             ValueError: this value can move the axis, so it needs a grant.
@@ -249,10 +250,10 @@ class Drive(ReadableDrive):
         await self._sent(parameter, raw)
 
     async def stop_by(self, key: str, raw: int) -> None:
-        """Write what STOP brakes with, without reading back or a grant.
+        """Write a value by which STOP brakes, without reading back or a grant.
 
-        For `backend.stopping` alone (a test holds that): some ways to brake are values that could
-        move an axis at another time, such as another mode with the setpoint zero, or halt.
+        Only for STOP (checked by a test): some values that brake could move an axis at another
+        time, such as another mode with the setpoint zero, or halt.
 
         Raises:
             DriveError: as `write`.
@@ -260,10 +261,10 @@ class Drive(ReadableDrive):
         await self._sent(self.parameter(key), raw)
 
     async def trigger(self, key: str, raw: int) -> None:
-        """Write an object that runs something and moves nothing, without reading back.
+        """Write an object that starts a procedure without motion, without reading back.
 
         Raises:
-            NotGranted: it can put energy into the motor.
+            NotGranted: it can energise the motor.
             DriveError: as `write`.
         """
         self._refuse_energising(key, raw)
@@ -291,7 +292,7 @@ class Drive(ReadableDrive):
         self.listeners.commanded(record)
 
     async def _send(self, port: Port, parameter: Parameter, value: Raw) -> None:
-        """Write; a time-out is unknown, so it is read back and never blindly repeated."""
+        """Write; after a timeout the outcome is unknown, so it is read back and not repeated."""
         address = address_of(parameter)
         data = encode(parameter.type, value)
         try:
@@ -315,14 +316,14 @@ class Drive(ReadableDrive):
             self._changes.stored[parameter.key] = known.raw
 
     async def _require_no_power(self, parameter: Parameter) -> None:
-        """Raises NotAllowed where the motor has power."""
+        """Raise NotAllowed where the motor has power."""
         status = self.key("status_word")
         if status is None:
             return
         try:
             state = self.decode_state(await self.raw(status))
         except DriveError as error:
-            # What was wanted is what the person knows of.
+            # The person knows the parameter that was to be written, not the status word.
             error.parameter = parameter.key
             raise
         if state in _POWERED:

@@ -1,9 +1,10 @@
-"""A drive that must be left alone for a while: the gate before its link.
+"""Exclusive access to a drive for a time, as a lock before its link.
 
-Some drives bear no SDO while they store their parameters: an EP3E that is asked meanwhile stores
-nothing (001:1209-1212). The gate lets what is under way end, then only the procedure through;
-others wait when it is short, and are informed how long it takes when it is not. Commands of motion,
-a STOP above all, do not ask the gate: they end the rest, whatever becomes of the storing.
+Some drives accept no SDO while they store their parameters: an EP3E that receives one meanwhile
+stores nothing (001:1209-1212). The lock waits for the requests under way, then admits only the
+procedure. Other requests wait when the access is short, and otherwise fail with its remaining
+time. Motion commands, above all STOP, do not wait: they end the exclusive access, even though the
+storing may fail.
 """
 
 from __future__ import annotations
@@ -16,16 +17,19 @@ from contextlib import asynccontextmanager
 
 from drivers.errors import Busy
 
-#: A rest that ends within this time is waited for.
+#: Other requests wait for an exclusive access that ends within this time [s].
 _PATIENCE_S = 2.5
 
 
 class ExclusiveAccessHeld(Busy):
-    """The drive is left alone; nothing was asked."""
+    """Another task has exclusive access to the drive; nothing was requested."""
 
 
 class ExclusiveAccess:
-    """Who may ask a drive now. For the event loop; a task that asks may ask within that again."""
+    """Lock that decides which task may send requests to a drive now.
+
+    For the event loop only; a task may nest its requests.
+    """
 
     def __init__(self, drive: str) -> None:
         self._drive = drive
@@ -37,15 +41,15 @@ class ExclusiveAccess:
 
     @property
     def held(self) -> bool:
-        """Somebody has the drive alone."""
+        """Whether a task has exclusive access."""
         return self._alone is not None
 
     @asynccontextmanager
     async def alone(self, seconds: float) -> AsyncIterator[None]:
-        """Begins when every request of others has ended; they stay away for ``seconds``.
+        """Exclusive access, from when all requests of other tasks have ended, for ``seconds``.
 
         Raises:
-            ExclusiveAccessHeld: another task has the drive alone already.
+            ExclusiveAccessHeld: another task has exclusive access already.
         """
         task = asyncio.current_task()
         self._refuse()
@@ -63,10 +67,10 @@ class ExclusiveAccess:
 
     @asynccontextmanager
     async def asking(self) -> AsyncIterator[None]:
-        """Around a request to the drive; waits for the end of a short rest.
+        """Context of a request to the drive; waits for the end of a short exclusive access.
 
         Raises:
-            ExclusiveAccessHeld: the drive is left alone for longer than that.
+            ExclusiveAccessHeld: the exclusive access of another task lasts longer.
         """
         task = asyncio.current_task()
         while self._alone not in (None, task) and task not in self._asking:
@@ -83,7 +87,7 @@ class ExclusiveAccess:
                 self._calmer.set()
 
     def interrupt(self) -> None:
-        """A command is more urgent: the rest is over, unless the commanding task holds it."""
+        """End the exclusive access for a command, unless the commanding task holds it."""
         if self._alone is not asyncio.current_task():
             self._end()
 

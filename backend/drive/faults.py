@@ -1,4 +1,4 @@
-"""Which faults of the profile are present, shown by bits and by the error code."""
+"""Active faults of a drive, from fault bits and from the error code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def fault_keys(drive: Drive) -> list[str]:
         reachable.add(kind.key)
     history = drive.profile.functions.history
     if history is not None and history.kind == "selected":
-        # The newest record shows which fault it is where 603Fh does not (R6L, 002:12361).
+        # The newest record identifies the fault where 603Fh does not (R6L, 002:12361).
         for key in (history.select_key, history.code_key, drive.key("status_word")):
             if key is not None and not drive.unreachable_why(drive.parameter(key)):
                 reachable.add(key)
@@ -31,17 +31,17 @@ async def read_active_faults(drive: Drive) -> list[Fault]:
     """Faults and warnings that the drive reports, read now.
 
     Raises:
-        DriveError: it does not answer, so it is not known.
+        DriveError: the drive does not answer, so its faults are not known.
     """
     readings = await drive.read_many(fault_keys(drive))
     if all(reading.raw is None for reading in readings.values()):
-        # Nothing was reported: by a drive that lacks these objects, or by none at all.
+        # No object was read: the drive lacks them all, or does not answer at all.
         await drive.read(drive.require("status_word"))
     return active_faults(drive, readings)
 
 
 def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
-    """Faults and warnings in these readings; an unknown code makes a record of its own."""
+    """Faults and warnings in these readings; an unknown code becomes a record of its own."""
     code = integer(readings.get(drive.key("error_code") or "")) or 0
     masked = code & 0xFF if drive.profile.quirk("error_code_low_byte") else code
     found: list[Fault] = []
@@ -70,7 +70,7 @@ def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
 def _of_the_present_kind(
     drive: Drive, readings: Mapping[str, Reading], found: list[Fault]
 ) -> list[Fault]:
-    """Where fault and alarm share a number, the one that bit 7 of the status word means."""
+    """Of a fault and a warning with the same number, the one that status word bit 7 indicates."""
     quirk = drive.profile.quirk("warning_bit_7")
     status = integer(readings.get(quirk.key or "")) if quirk is not None else None
     if status is None:
@@ -80,7 +80,7 @@ def _of_the_present_kind(
 
 
 def _newest_record(drive: Drive, readings: Mapping[str, Reading]) -> Fault | None:
-    """The fault of the newest record of a drive in "fault", where its window shows that record."""
+    """Fault of the newest record of a drive in Fault, where the selector is on that record."""
     history = drive.profile.functions.history
     if history is None or history.kind != "selected" or not history.code_format:
         return None
@@ -92,7 +92,7 @@ def _newest_record(drive: Drive, readings: Mapping[str, Reading]) -> Fault | Non
     found = next((fault for fault in drive.profile.faults if fault.code == code), None)
     if found is None:
         return None
-    # Which record is the newest is not printed (002:12361): say where the name comes from.
+    # The manual does not state which record is newest (002:12361), so the name has its source.
     return found.model_copy(update={"name": f"{found.name} (by record 0 of the drive's log)"})
 
 

@@ -1,4 +1,4 @@
-"""Whether the drive that answers at a place is the one that was connected there."""
+"""Check that the drive that answers at a station is the one that was connected there."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from drivers.texts.message import text
 
 
 async def read_serial(drive: Drive) -> int | None:
-    """Serial number of the drive that answers now (1018h:04), or None where it has none.
+    """Serial number of the drive that answers now (1018h:04); None where it has none.
 
     Raises:
-        LinkTimeout, LinkLost: it does not answer.
+        LinkTimeout, LinkLost: the drive does not answer.
     """
     for port in drive.ports:
         if port.link.traits.registers:
@@ -27,7 +27,7 @@ async def read_serial(drive: Drive) -> int | None:
 
 
 async def confirm_identity(drive: Drive) -> None:
-    """Ask for the serial number again, where it is known and the drive reports it.
+    """Read the serial number again and compare it, where it is known and the drive reports it.
 
     Raises:
         NotAllowed: another drive answers here.

@@ -1,4 +1,4 @@
-"""Who is informed of what was read from a drive, written to it and commanded; on the event loop."""
+"""Listeners to readings, writes, commands and refusals of a drive; called on the event loop."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
 
 
 class DriveListeners:
-    """Of one drive."""
+    """Listeners of one drive."""
 
     def __init__(self) -> None:
         self._readings: list[Callable[[list[Reading]], None]] = []
@@ -17,20 +17,20 @@ class DriveListeners:
         self._refusals: list[Callable[[Refusal], None]] = []
 
     def add(self, listener: Callable[[list[Reading]], None]) -> Callable[[], None]:
-        """Call ``listener`` with every batch of new readings, until what is returned is called."""
+        """Call ``listener`` with every batch of new readings; return a function to remove it."""
         self._readings.append(listener)
         return lambda: self._readings.remove(listener)
 
     def add_writes(self, listener: Callable[[WriteRecord], None]) -> None:
-        """Call ``listener`` after everything that `Drive.write` sent, whatever came of it."""
+        """Call ``listener`` after every write that `Drive.write` sent, also where it failed."""
         self._writes.append(listener)
 
     def add_commands(self, listener: Callable[[CommandRecord], None]) -> None:
-        """Call ``listener`` after everything that `Drive.command` sent, whatever came of it."""
+        """Call ``listener`` after every command sent without reading back, also where it failed."""
         self._commands.append(listener)
 
     def add_refusals(self, listener: Callable[[Refusal], None]) -> None:
-        """Call ``listener`` after every write that was refused as it can move the axis."""
+        """Call ``listener`` after every write that was refused because it can move the axis."""
         self._refusals.append(listener)
 
     def refused(self, refusal: Refusal) -> None:

@@ -1,16 +1,16 @@
-"""Which parameters of a drive command its motion, and on which a motion relies."""
+"""Parameters of a drive that command motion, and parameters on which a motion relies."""
 
 from __future__ import annotations
 
 from profiles.schema import Profile
 
-#: Roles that command motion; they are never "changed but not saved".
+#: Roles that command motion; they are never marked as changed but not saved.
 _COMMAND_ROLES = frozenset({
     "control_word", "mode", "position_target", "position_offset", "velocity_target",
     "velocity_offset", "torque_target", "torque_offset",
 })  # fmt: skip
 
-#: Roles that a motion sets for its own length, or that change what its numbers mean.
+#: Roles that a motion sets for its duration, or that change the meaning of its values.
 _MOTION_ROLES = frozenset({
     "profile_velocity", "profile_acceleration", "profile_deceleration", "max_torque",
     "torque_limit_positive", "torque_limit_negative", "home_offset", "quick_stop_deceleration",
@@ -18,7 +18,7 @@ _MOTION_ROLES = frozenset({
 
 
 def command_keys(profile: Profile) -> frozenset[str]:
-    """Keys whose writing commands motion or a procedure at once."""
+    """Keys whose write commands motion or a procedure immediately."""
     return frozenset(
         {signal.key for signal in profile.signals if signal.role in _COMMAND_ROLES}
         | {step.key for proc in profile.procedures for step in proc.steps if step.do == "write"}
@@ -28,7 +28,7 @@ def command_keys(profile: Profile) -> frozenset[str]:
 def motion_keys(profile: Profile) -> frozenset[str]:
     """Keys that must stay as they are while a motion is under way.
 
-    These are commands, the gearing and unit switches, and what a motion sets for its own length:
+    These are commands, gearing, unit switches, and the values that a motion sets for its duration:
     ramps and torque limits. Gains may be changed while the axis moves.
     """
     return (

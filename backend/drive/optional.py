@@ -1,7 +1,8 @@
-"""Which objects of a profile a drive really has, where CiA 402-2 leaves them to the maker.
+"""Objects that a drive really has, among those that CiA 402-2 makes optional.
 
-A profile of the standard names them all; a drive that lacks one refuses to be asked for it. That
-is asked again where it matters, as a drive that is still starting may deny what it has.
+The standard profile contains all of them; a drive that lacks one refuses to read it. The result is
+not stored but read again where it matters, as a drive that is still starting may refuse an object
+that it has.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ _TORQUE_LIMITS = ("torque_limit_positive", "torque_limit_negative", "max_torque"
 
 
 async def existing(drive: Drive, keys: Iterable[str | None]) -> dict[str, Reading]:
-    """What was read of those of ``keys`` that the drive has, in their order; None is no key.
+    """Readings of those ``keys`` that the drive has, in their order; None is skipped.
 
     Raises:
-        DriveError: one cannot be read for any other reason.
+        DriveError: a key cannot be read for any other reason.
     """
     found: dict[str, Reading] = {}
     for key in keys:
@@ -37,13 +38,13 @@ async def existing(drive: Drive, keys: Iterable[str | None]) -> dict[str, Readin
 
 
 async def torque_limits(drive: Drive) -> list[str]:
-    """Keys of the drive's torque limits that together hold both directions.
+    """Keys of the drive's torque limits, which together limit both directions.
 
-    A family whose profile names no limit at all has none. 6072h, 60E0h and 60E1h are optional in
-    CiA 402-2: the first holds both directions, the others one each.
+    Empty for a profile without any torque limit. 6072h, 60E0h and 60E1h are optional in CiA 402-2:
+    the first limits both directions, the others one each.
 
     Raises:
-        NotAllowed: the drive lacks those that its profile names, so that one direction is free.
+        NotAllowed: the drive lacks limits that its profile names, so one direction has no limit.
         DriveError: a limit cannot be read.
     """
     named = [key for role in _TORQUE_LIMITS if (key := drive.key(role)) is not None]
@@ -59,12 +60,13 @@ async def torque_limits(drive: Drive) -> list[str]:
 
 
 async def ramp_keys(drive: Drive) -> tuple[str, str]:
-    """Keys of the profile's acceleration and deceleration.
+    """Keys of profile acceleration and profile deceleration.
 
-    Without 6084h the drive brakes by 6083h too (CiA 402-2, object 6084h), so both are the same.
+    Without 6084h the drive also brakes by 6083h (CiA 402-2, object 6084h), so both keys are the
+    same.
 
     Raises:
-        NotAllowed: the drive has no profile acceleration, so where it would stop is not known.
+        NotAllowed: the drive has no profile acceleration, so its stopping distance is not known.
         DriveError: a ramp cannot be read.
     """
     up, down = drive.require("profile_acceleration"), drive.require("profile_deceleration")

@@ -1,4 +1,4 @@
-"""The restore list of a drive: values changed for a motion that could not be restored yet."""
+"""The restore list of a drive: values changed for a motion and not restored yet."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from profiles.schema import Raw
 
 @dataclass(frozen=True, slots=True)
 class PendingRestore:
-    """One parameter that may still hold what was meant for a while; raw values.
+    """One parameter that may still hold a temporary value; raw values.
 
-    ``left`` is what it holds if nobody changed it since: empty where that is not known.
-    ``unapplied``: the value is back, but the drive has not been commanded to act on it.
+    ``raw``: value to restore. ``left``: possible values now if nobody changed it since; empty where
+    they are not known. ``unapplied``: the value is restored but not in effect, as the drive has not
+    been commanded to apply it.
     """
 
     key: str
@@ -26,22 +27,22 @@ class PendingRestore:
 
 
 class Note(Protocol):
-    """What writes the list down; ``durable`` waits for the disk, within bounds."""
+    """Callback that stores the list; with ``durable`` it waits for the disk, for a limited time."""
 
     def __call__(self, *, durable: bool = False) -> None:
-        """Write down what is outstanding now.
+        """Store the restores that are outstanding now.
 
         Raises:
-            NotAllowed: it cannot be written, and ``durable``: a value is about to change.
+            NotAllowed: they cannot be stored, with ``durable`` (a value is about to change).
         """
 
 
 def _no_note(*, durable: bool = False) -> None:
-    """Nobody keeps the list."""
+    """Default where the list is not stored."""
 
 
 class PendingRestores:
-    """Pending restores of one drive, in the order in which they arose. For the event loop."""
+    """Pending restores of one drive, in order of occurrence. For the event loop only."""
 
     def __init__(self) -> None:
         self._entries: dict[str, PendingRestore] = {}
@@ -62,18 +63,18 @@ class PendingRestores:
         self._note = note
 
     def recall(self, entries: Iterable[PendingRestore]) -> None:
-        """What a process that is no more has left."""
+        """Take over the entries that an ended process has left."""
         for entry in entries:
             self._entries[entry.key] = entry
             self._sent[entry.key] = entry.left
 
     @contextmanager
     def temporary(self, values: Mapping[str, Raw]) -> Iterator[None]:
-        """Around a motion that changes these raw values and restores them when it ends.
+        """Context of a motion that changes these raw values and restores them when it ends.
 
         Raises:
-            NotAllowed: the list cannot be kept on the disk. Nothing may be changed then: after a
-                kill nobody would know what to restore.
+            NotAllowed: the list cannot be stored on the disk. Nothing may be changed then, as after
+                a kill of the process the values to restore would not be known.
         """
         temporary = dict(values)
         known = all(key in self._temporary for key in temporary)
@@ -92,7 +93,7 @@ class PendingRestores:
 
     @property
     def outstanding(self) -> tuple[PendingRestore, ...]:
-        """What would be pending if this process ended now, without restoring anything."""
+        """Restores that would be pending if this process ended now without restoring anything."""
         temporary = {
             key: PendingRestore(key, raws[0], self._sent.get(key, frozenset()))
             for key, raws in self._temporary.items()
@@ -101,7 +102,7 @@ class PendingRestores:
 
     @property
     def in_motion(self) -> bool:
-        """A motion goes on that has changed something for its length."""
+        """Whether a motion is under way that has changed values for its duration."""
         return bool(self._temporary)
 
     @property
@@ -111,11 +112,11 @@ class PendingRestores:
 
     @property
     def unapplied(self) -> bool:
-        """Something that is back does not act yet."""
+        """Whether a restored value is not in effect yet."""
         return any(entry.unapplied for entry in self._entries.values())
 
     def add(self, values: Mapping[str, Raw], *, unapplied: bool = False) -> None:
-        """These raw values could not be restored, or (``unapplied``) not made to act."""
+        """Add raw values that could not be restored or, with ``unapplied``, not be applied."""
         for key, raw in values.items():
             known = self._entries.get(key)
             left = self._sent.get(key, frozenset())
@@ -127,9 +128,10 @@ class PendingRestores:
             self._changed()
 
     def sent(self, key: str, wanted: Raw, after: Raw | None) -> None:
-        """A write went out; ``after`` is what was read back, None where that is not known.
+        """Record a write; ``after`` is the value read back, None where it is not known.
 
-        After a write of another value by a person, the restore is offered and not done.
+        After a person has written another value, the restore is offered but not carried out
+        automatically.
         """
         earlier = self._sent.get(key, frozenset())
         self._sent[key] = earlier | {wanted} if after is None else frozenset({after})
@@ -140,34 +142,35 @@ class PendingRestores:
             self._note()
 
     def original(self, key: str, raw: Raw) -> Raw:
-        """What it was before all motions that have changed it; ``raw`` where none has."""
+        """Raw value before all motions that have changed it; ``raw`` where none has."""
         return self._temporary[key][0] if key in self._temporary else raw
 
     def is_temporary(self, key: str) -> bool:
-        """A motion has changed this for its length, and restores it."""
+        """Whether a motion has changed this parameter for its duration and restores it."""
         return key in self._temporary
 
     def restores(self, key: str, raw: Raw) -> bool:
-        """Whether writing this raw value restores what a motion has changed."""
+        """Whether writing this raw value restores a value that a motion has changed."""
         entry = self._entries.get(key)
         return raw in self._temporary.get(key, ()) or (entry is not None and entry.raw == raw)
 
     def commanded(self, key: str, raw: Raw) -> None:
-        """A motion object is about to be written, which nobody reads back.
+        """Record a motion object that is about to be written without reading back.
 
-        Only the mode of these is ever temporary; setpoints and control words leave no trace here.
+        Of these objects only the mode can be temporary; setpoints and control words are not
+        recorded.
         """
         if key in self._temporary or key in self._entries:
             self.sent(key, raw, None)
 
     def seen(self, readings: Iterable[Reading]) -> None:
-        """A parameter that holds its original value again is no longer pending."""
+        """Remove entries whose parameter holds its original value again, according to readings."""
         entries = self._entries
         gone = [r.key for r in readings if r.key in entries and r.raw == entries[r.key].raw]
         self.settle([key for key in gone if not entries[key].unapplied])
 
     def settle(self, keys: Iterable[str]) -> None:
-        """These are back, or shall stay as they are."""
+        """Remove entries that are restored, or that shall stay as they are."""
         gone = [key for key in keys if self._entries.pop(key, None) is not None]
         if gone:
             self._changed()

@@ -1,4 +1,4 @@
-"""The ways to reach a drive, and which of its parameters go each way."""
+"""Ports of a drive, and the parameters that each port carries."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from drivers.link import Address, Link, LinkTraits
 from drivers.texts.message import Text, text
 from profiles.schema import LinkSpec, Parameter
 
-#: Addresses per call where the link lets a write go between two requests of a batch, and where
-#: neighbouring registers share a request: those of a long batch are split less often.
+#: Addresses per call for register links, which admit a write between two requests of a batch. As
+#: neighbouring registers share a request, a long batch splits fewer of them.
 REGISTER_BATCH = 64
 
 
@@ -25,7 +25,7 @@ class Port:
     spec: LinkSpec | None
 
     def batches(self, parameters: Sequence[Parameter]) -> list[list[Parameter]]:
-        """Parts to ask for in one call each; what is read together stays together."""
+        """Batches to read in one call each; parameters of one object stay together where needed."""
         if self.link.traits.whole_objects:
             return _whole_objects(parameters, self.link.traits.batch)
         size, ordered = self.link.traits.batch, list(parameters)
@@ -39,7 +39,7 @@ class Port:
         return carries(self.link.traits, parameter) and self.why_not(parameter) is None
 
     def why_not(self, parameter: Parameter) -> Text | None:
-        """Why the link does not carry a parameter that its kind could carry; None where it does."""
+        """Why the link does not carry a parameter that its bus could carry; None where it does."""
         return self.link.unreachable(self.station, address_of(parameter))
 
 
@@ -72,7 +72,7 @@ def port_for(drive: str, ports: Sequence[Port], parameter: Parameter) -> Port:
     """The first port that can carry the parameter of the drive of this name.
 
     Raises:
-        NotAllowed: none can; the message says which link would.
+        NotAllowed: none can; the message states which link would.
     """
     for port in ports:
         if port.carries(parameter):
@@ -87,7 +87,7 @@ def port_for(drive: str, ports: Sequence[Port], parameter: Parameter) -> Port:
 
 
 def unreachable_why(ports: Sequence[Port], parameter: Parameter) -> Text | None:
-    """None when some port carries the parameter, else why none does."""
+    """Why no port carries the parameter; None where one does."""
     if any(port.carries(parameter) for port in ports):
         return None
     for port in ports:

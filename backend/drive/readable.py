@@ -1,4 +1,4 @@
-"""What a drive is, which of its values are not saved or not in force, and typed reads."""
+"""Identity of a drive, marks of values not saved or not in effect, and typed reads."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from profiles.schema import Parameter, Profile
 
 
 class ReadableDrive:
-    """What a drive is, and reading it.
+    """One drive: its identity, its change marks and typed reads.
 
     ``readings`` holds the last answer for every parameter that was read.
     """
@@ -43,7 +43,7 @@ class ReadableDrive:
         authority: MotionAuthority | None = None,
     ) -> None:
         self.id = drive_id
-        #: Who may move it: the bench's, or one of its own outside a server.
+        #: Motion authority: shared within a server; the drive's own outside a server.
         self.authority = MotionAuthority() if authority is None else authority
         self.name = name
         self.exclusive = ExclusiveAccess(name)
@@ -82,12 +82,12 @@ class ReadableDrive:
         """The first port that can carry the parameter.
 
         Raises:
-            NotAllowed: none can; the message says which link would.
+            NotAllowed: none can; the message states which link would.
         """
         return port_for(self.name, self.ports, parameter)
 
     def unreachable_why(self, parameter: Parameter) -> Text | None:
-        """None when some port carries the parameter, else why none does."""
+        """Why no port carries the parameter; None where one does."""
         return unreachable_why(self.ports, parameter)
 
     def quality(self) -> LinkQuality:
@@ -104,16 +104,16 @@ class ReadableDrive:
 
     @property
     def modes_key(self) -> str | None:
-        """Where the drive reports its modes, if its profile does not know them.
+        """Key of 6502h where the profile does not know the modes; None otherwise.
 
-        Only a profile that stands for many drives does not: manuals print 6502h with wrong bits
-        (002:14076).
+        Only a profile for many drives does not know them. Elsewhere 6502h is not used, as manuals
+        print it with wrong bits (002:14076).
         """
         return self.key("supported_modes") if self.profile.partial else None
 
     @property
     def modes(self) -> tuple[int, ...]:
-        """Modes of operation: the profile's, without those that the drive itself says it lacks."""
+        """Modes of operation of the profile, without those that the drive reports as absent."""
         modes = self.profile.supported_modes
         reading = self.readings.get(self.modes_key or "")
         reported = reading.raw if reading is not None else None
@@ -123,10 +123,10 @@ class ReadableDrive:
         return tuple(mode for mode in modes if mode not in lacks) or modes
 
     def require(self, role: str) -> str:
-        """Like `key`, for a role that cannot be done without.
+        """Like `key`, for a role that is necessary.
 
         Raises:
-            NotAllowed: the family has no such parameter here.
+            NotAllowed: the drive has no parameter with this role that a connected port carries.
         """
         key = self.key(role)
         if key is None:
@@ -139,11 +139,11 @@ class ReadableDrive:
         return key
 
     def decode_state(self, status_word: int) -> cia402.State:
-        """CiA 402 state, with the family's own reading of the status word."""
+        """CiA 402 state, with the family's own interpretation of the status word."""
         return cia402.decode_state(status_word, echoes_control=self._own_status)
 
     def fault_bit(self, key: str) -> int | None:
-        """The bit of the family's status word that reports a fault; None of any other object."""
+        """Bit of the family's status word that reports a fault; None for any other object."""
         if key != self.key("status_word"):
             return None
         return cia402.fault_bit(echoes_control=self._own_status)
@@ -151,7 +151,7 @@ class ReadableDrive:
     # --- change marks ----------------------------------------------------------------
 
     def commands_motion(self, key: str) -> bool:
-        """Whether writing this parameter commands motion or a procedure at once."""
+        """Whether writing this parameter commands motion or a procedure immediately."""
         return key in self._command_keys
 
     def matters_to_motion(self, key: str) -> bool:
@@ -165,21 +165,24 @@ class ReadableDrive:
 
     @property
     def pending(self) -> dict[str, str]:
-        """Keys that wait for something before they act, and for what."""
+        """Keys of parameters that are not in effect yet, each with the action it waits for."""
         return dict(self._changes.pending)
 
     def mark_saved(self) -> None:
-        """The drive stored its parameters."""
+        """Clear the marks of unsaved changes, as the drive stored its parameters."""
         self._changes.stored.clear()
         self._announce_all()
 
     def mark_applied(self, *what: str) -> None:
-        """What waited for one of ``what`` (write_settings, reenable, power_cycle) acts now."""
+        """Clear the pending marks that wait for one of ``what``.
+
+        One of: write_settings, reenable, power_cycle.
+        """
         self._changes.applied(*what)
         self._announce_all()
 
     def forget(self) -> None:
-        """The drive restarted: nothing that was read before is trusted."""
+        """Discard all readings and change marks, as the drive restarted."""
         self._changes.forget()
         self.readings.clear()
 
@@ -192,7 +195,7 @@ class ReadableDrive:
         """Read one parameter from the drive.
 
         Raises:
-            DriveError: with drive and parameter named.
+            DriveError: the parameter cannot be read; the error names drive and parameter.
         """
         parameter = self.parameter(key)
         if parameter.access == "wo":
@@ -221,10 +224,10 @@ class ReadableDrive:
         keys: Iterable[str],
         progress: Callable[[float, Text], None] | None = None,
     ) -> dict[str, Reading]:
-        """Read several parameters; one that fails comes back with ``error`` set.
+        """Read several parameters; one that fails is returned with ``problem`` set.
 
-        A drive that leaves several batches in a row without an answer is not asked for the rest.
-        What a link left out because the drive was slow is asked once more at the end.
+        After several batches in a row without an answer, the rest is not requested. Parameters that
+        a link left out because the drive was slow are read once more at the end.
 
         Raises:
             LinkLost: the bus is gone; readings made before stay.
@@ -274,7 +277,7 @@ class ReadableDrive:
         return readings
 
     def take(self, raws: Mapping[str, int | float]) -> dict[str, Reading]:
-        """Keep values that came without being asked for, as with the process data."""
+        """Store raw values that arrived without a request, such as process data."""
         now = time.time()
         readings = {
             key: Reading(key, raw, self.parameter(key).to_value(raw), now)

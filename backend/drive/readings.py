@@ -1,4 +1,4 @@
-"""What is known of a drive's parameters, and what was sent to them."""
+"""Records of a drive's parameters: readings, writes, commands and refusals."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from profiles.schema import Raw
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What a drive said of one parameter. ``value`` is in the parameter's unit."""
+    """Last reading of one parameter. ``value`` is in the parameter's unit."""
 
     key: str
     raw: Raw | None
@@ -20,7 +20,7 @@ class Reading:
     problem: Text | None = None
     """Why there is no value."""
     unused: bool = False
-    """The drive's own count leaves it out, as ``problem`` says: there is nothing to be read."""
+    """The drive's own count excludes this subindex, as ``problem`` states: it has no value."""
 
     @property
     def error(self) -> str:
@@ -37,8 +37,8 @@ class Reading:
 class WriteRecord:
     """A value that was sent to the drive; raw values.
 
-    ``before`` is what was known before, ``after`` what was read back; ``problem`` states why that
-    is not known, and then the drive may hold either.
+    ``before``: last known value; ``after``: value read back. ``problem`` states why ``after`` is
+    not known; the drive may then hold either value.
     """
 
     drive: str
@@ -53,7 +53,7 @@ class WriteRecord:
 
 @dataclass(frozen=True, slots=True)
 class CommandRecord:
-    """A motion object that was sent without reading back; ``problem`` empty where it arrived."""
+    """A value that was sent without reading back; ``problem`` is None where it was sent."""
 
     drive: str
     name: str
@@ -65,7 +65,7 @@ class CommandRecord:
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A write that was not sent as it can move the axis and nobody had the permission."""
+    """A write that was not sent, as it can move the axis and the caller had no grant."""
 
     drive: str
     name: str

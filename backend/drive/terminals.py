@@ -17,9 +17,9 @@ from profiles.schema import IoTerminal
 
 @dataclass(frozen=True, slots=True)
 class TerminalState:
-    """One terminal as it is. None: the drive does not report.
+    """Present state of one terminal. None: the drive does not report it.
 
-    ``same_function`` are the other terminals that were given the same function.
+    ``same_function``: other terminals with the same function.
     """
 
     terminal: IoTerminal
@@ -73,7 +73,8 @@ def _bit(
 def _with_twins(states: list[TerminalState], facts: TerminalFacts) -> list[TerminalState]:
     """Mark terminals of one direction with the same function.
 
-    By name: one code may mean different things at different terminals (MMS7, 004:6470).
+    Compared by name, as one code may have different meanings at different terminals (MMS7,
+    004:6470).
     """
     unused = {"in": facts.unused_inputs, "out": facts.unused_outputs}
     having: dict[tuple[str, str], list[str]] = defaultdict(list)
@@ -103,7 +104,7 @@ def _with_twins(states: list[TerminalState], facts: TerminalFacts) -> list[Termi
 
 @dataclass(frozen=True, slots=True)
 class ProbeSettings:
-    """How one probe latches. ``source`` is the value of its source bits in 60B8h."""
+    """Settings of one touch probe. ``source``: value of its source bits in 60B8h."""
 
     on: bool
     continuous: bool
@@ -126,10 +127,12 @@ def probe_bits(settings: ProbeSettings) -> int:
 async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Reading:
     """Set up touch probe 1 or 2; the other one stays as it is.
 
-    It is switched off in between: drives take settings over on the edge of its bit (001:710).
+    It is switched off first, as drives accept settings on the edge of its enable bit (001:710).
 
     Raises:
-        NotAllowed: no such probe. OutOfRange: no such source, or no edge chosen.
+        NotAllowed: no such probe.
+        OutOfRange: no such source, or no edge chosen.
+        Rejected: the drive did not keep the setting.
     """
     probe = functions_of(drive.profile).probe
     if probe is None or not 1 <= number <= len(probe.probes):
@@ -169,6 +172,6 @@ async def set_probe(drive: Drive, number: int, settings: ProbeSettings) -> Readi
 
 
 def _signed(drive: Drive, key: str, raw: int) -> int:
-    """60B8h is printed as INT16 by one maker (000:3040)."""
+    """Raw value as signed number where the profile has INT16 for 60B8h (one maker, 000:3040)."""
     is_signed = drive.parameter(key).type == "INT16" and raw >= 0x8000
     return raw - 0x10000 if is_signed else raw

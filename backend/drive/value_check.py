@@ -1,4 +1,4 @@
-"""Whether a value may be written to a parameter, judged before a byte leaves."""
+"""Check on the host whether a value may be written to a parameter."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from profiles.schema import Parameter, Raw
 
 
 def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:
-    """A raw value as it will be written to this parameter of the drive of this name.
+    """Check a raw value and return it as it will be written; ``drive`` is the drive's name.
 
     Raises:
-        NotAllowed: read-only.
+        NotAllowed: the parameter is read-only.
         OutOfRange: wrong type, outside the limits, or not one of the enumerated values.
     """
     label = f"{drive}: {parameter.key} {parameter.name}"
@@ -59,9 +59,9 @@ def checked(drive: str, parameter: Parameter, raw: Raw) -> Raw:
 def named(
     drive: str, error: DriveError, parameter: Parameter, value: Raw | None = None
 ) -> DriveError:
-    """The same error, naming drive and parameter in its text."""
-    # A link names the node; the person knows the drive by the name on the bench. What was raised
-    # for this drive already has its name in the text.
+    """The same error with drive and parameter named in its text."""
+    # A link names the node; the person knows the drive by its name in the axis list. An error that
+    # was raised for this drive already has the name in its text.
     anonymous, error.drive = error.drive != drive, drive
     error.at(parameter=parameter.key)
     if value is not None and error.value is None:

@@ -1,1 +1,1 @@
-"""Functions of a drive that a person sets: forced signals, terminals, gearing, braking."""
+"""Functions of a drive that a person operates: forced signals, terminals, gearing, braking."""

@@ -1,8 +1,9 @@
 """Settings that can start a motion at once: functions of terminals, control sources, mappings.
 
-A terminal that is given "jog" while its input is on begins to jog, with a status word that says
-"disabled". So such a setting is written with a grant, only while the motor has no power; the
-shaft is watched afterwards, and where it turns the setting is restored and the axis is stopped.
+A terminal that is assigned "jog" while its input is on starts a jog, while the status word still
+shows a disabled axis. Such a setting is therefore written with a grant, and only while the motor
+has no power. The shaft is supervised afterwards; where it turns, the setting is restored and the
+axis is stopped.
 """
 
 from __future__ import annotations
@@ -22,21 +23,22 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Raw
 
-#: For so long the shaft is watched; a drive's own jog turns it at once.
+#: Time for which the shaft is supervised, and polling period [s]; a drive's own jog turns it at
+#: once.
 _WATCHED_S, _LOOK_S = 0.3, 0.01
-#: What a shaft at standstill may move, as noise of its encoder or by a jolt.
+#: Movement of a shaft at standstill by encoder noise or a jolt [rev].
 _STILL_REV = 0.001
 _AT_REST_S = 0.3
 _DISABLED = frozenset({State.SWITCH_ON_DISABLED, State.READY, State.NOT_READY, State.FAULT})
 
 
 async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
-    """Write one such setting, read it back, and make sure that nothing turns.
+    """Write one such setting, read it back, and check that the shaft does not turn.
 
-    ``reason`` is the person's, for the purpose of the grant.
+    ``reason``: given by the person, for the purpose of the grant.
 
     Raises:
-        NotGranted: it is a command, not a setting; the error says where it belongs.
+        NotGranted: it is a command, not a setting; the message states where it belongs.
         NotAllowed: the motor has power, the shaft turns, or it began to turn.
         Busy: something moves the axis.
     """
@@ -77,12 +79,12 @@ async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
 
 
 async def _require_inputs_off(axis: Axis, parameter: Parameter, raw: Raw) -> None:
-    """The input that gets a function is off, and one that is inverted has no function.
+    """Check that an input to be assigned is off, and that one to be inverted has no function.
 
-    A drive may not let a function be removed again while it acts (M6-L), so this comes first.
+    This is checked first, as a drive may refuse to remove a function while it is active (M6-L).
 
     Raises:
-        NotAllowed: the function would act at once.
+        NotAllowed: the function would take effect at once.
     """
     drive = axis.drive
     facts = drive.profile.functions.terminals
@@ -123,7 +125,7 @@ def _inverts(axis: Axis, state: TerminalState, parameter: Parameter, raw: Raw) -
 
 
 async def _turns(axis: Axis, start: int) -> bool:
-    """Whether the shaft leaves this place while it is watched."""
+    """Whether the shaft leaves the position ``start`` [increments] while it is supervised."""
     units = await axis.units()
     tolerance = max(2, units.position_raw(_STILL_REV))
     deadline = time.monotonic() + _WATCHED_S

@@ -1,4 +1,4 @@
-"""How a brake is kept closed while its axis is enabled, by what the family's manual prints."""
+"""Keeping a holding brake closed while its axis is enabled, as the family's manual permits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Obstacle = Literal[
 
 
 async def obstacle_of(drive: Drive) -> Obstacle | None:
-    """Why this drive would open its brake, or might; None where its outputs can be used."""
+    """Why this drive would or might release its brake; None where its outputs can be used."""
     means = drive.profile.functions.brake_test
     if means is None:
         return "means_unknown"
@@ -45,13 +45,13 @@ async def obstacle_of(drive: Drive) -> Obstacle | None:
 
 @asynccontextmanager
 async def kept_closed(axis: Axis) -> AsyncIterator[None]:
-    """Inside the block no output has the brake's function, so that its coil has no current.
+    """Context in which no output has the brake's function, so that its coil has no current.
 
-    The calling work holds the grant of the axis. Afterwards the functions are as before.
+    The calling work holds the grant of the axis. On exit the functions are restored.
 
     Raises:
         NotAllowed: the axis is enabled.
-        RestoreFailed: on leaving, naming what could not be restored.
+        RestoreFailed: on exit; the message names what could not be restored.
     """
     drive = axis.drive
     means = drive.profile.functions.brake_test
@@ -67,7 +67,7 @@ async def kept_closed(axis: Axis) -> AsyncIterator[None]:
 
 
 def forcing_keys(drive: Drive) -> frozenset[str]:
-    """Objects by which somebody could switch an output on meanwhile."""
+    """Keys of objects by which somebody could switch on an output meanwhile."""
     return frozenset(
         place.key
         for forcing in _forcings(drive)
@@ -93,7 +93,7 @@ async def _brake_outputs(drive: Drive) -> list[IoTerminal]:
 
 
 async def _inverted(drive: Drive, name: str) -> bool:
-    """Switched on while its function is off: then another function would open the brake."""
+    """Whether an output is inverted: it would be on without its function and release the brake."""
     for place in drive.profile.functions.terminals.polarities:
         if name in place.bits and await drive.raw(place.key) >> place.bits[name] & 1:
             return True
@@ -101,7 +101,7 @@ async def _inverted(drive: Drive, name: str) -> bool:
 
 
 async def _forced(drive: Drive, name: str) -> bool:
-    """The bus would switch it on as soon as its function lets it."""
+    """Whether the bus forces the output, so that it would be on as soon as its function permits."""
     for forcing in _forcings(drive):
         for place in (forcing.enable, forcing.value):
             if place is None or name not in place.bits:

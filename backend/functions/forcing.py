@@ -1,8 +1,8 @@
-"""Sessions that overrule terminals: forced outputs, simulated inputs.
+"""Sessions that override terminals: forced outputs, simulated inputs.
 
-A session belongs to one person's page. It ends when that page falls silent, when control of the
-axis passes to somebody else, on STOP, and on request; and on every way out the parameters are
-restored to what they were.
+A session belongs to one person's page. It ends when that page no longer responds, when another
+person takes control of the axis, on STOP, and on request. On every exit the parameters are
+restored.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from drivers.texts.answers import sentence
 from drivers.texts.message import Text, text
 from profiles.functions import Forcing, TerminalBits
 
-#: A session ends when its page has not renewed it for this long.
+#: A session ends when its page has not renewed it for this time [s].
 SILENT_S = 5.0
 _LOOK_S = 0.05
-#: Pause after "write settings"; the procedure of the one family that has it waits as long.
+#: Pause after "write settings" [s], as in the procedure of the only family that has it.
 _APPLY_S = 0.1
 _ENDED = text("functions.end-by-page")
 
 
 @dataclass(slots=True, eq=False)
 class ForcingSession:
-    """Terminals that a person overrules at present: ``values``, terminal to on or off."""
+    """Terminals that a person overrides at present. ``values``: on or off, by terminal."""
 
     axis: Axis
     spec: Forcing
@@ -52,16 +52,16 @@ class ForcingSession:
     lock: asyncio.Lock = field(default_factory=asyncio.Lock)
 
     def renew(self) -> None:
-        """The page is alive."""
+        """Record a sign of life of the page."""
         self.renewed = time.monotonic()
 
     async def set(self, wanted: Mapping[str, bool | None]) -> None:
-        """Overrule terminals, or release them (None).
+        """Override terminals, or release them (None).
 
         Raises:
             OutOfRange: no such terminal.
-            NotAllowed: the terminal must not be overruled, or its function does not let it.
-            Rejected: the drive does not keep what was written.
+            NotAllowed: the terminal must not be overridden, or its function does not permit it.
+            Rejected: the drive does not keep the written value.
         """
         for name, value in wanted.items():
             self._require_known(name)
@@ -77,13 +77,13 @@ class ForcingSession:
             self.values = values
 
     async def shut(self) -> None:
-        """Nothing is overruled from now on; a write that is under way is waited for."""
+        """Permit no further override, and wait for a write that is under way."""
         self.over = True
         async with self.lock:
             pass
 
     def _require_open(self) -> None:
-        """What came too late must not be written after all has been restored."""
+        """Raise NotAllowed where the session has ended, as its values are restored already."""
         if self.over:
             why = self.reason or text("functions.end-cancelled")
             raise NotAllowed(
@@ -98,7 +98,7 @@ class ForcingSession:
             )
 
     async def _require_allowed(self, name: str) -> None:
-        """A brake output is never forced, and an output needs the function that lets it."""
+        """Check that it is not a brake output, and that its function permits forcing."""
         drive = self.axis.drive
         facts = drive.profile.functions.terminals
         terminal = next((t for t in drive.profile.terminals if t.name == name), None)
@@ -128,7 +128,7 @@ class ForcingSession:
             )
 
     async def _write(self, values: Mapping[str, bool]) -> None:
-        """Released terminals let go first, and a value is there before a terminal follows it."""
+        """Write overrides: release terminals first, then write values, then enable overrides."""
         enable = self.spec.enable
         if enable is not None:
             staying = dict.fromkeys(self.values.keys() & values.keys(), True)
@@ -140,15 +140,15 @@ class ForcingSession:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Parameters of this session; the one that lets go of the terminals comes first."""
+        """Parameters of this session; first the one that releases the terminals."""
         places = (self.spec.enable, self.spec.value)
         return tuple(place.key for place in places if place is not None)
 
     async def _require_appliable(self) -> None:
-        """Where "write settings" is needed, it must not make other changes act by the way.
+        """Check that "write settings", where needed, does not put other changes into effect.
 
         Raises:
-            NotAllowed: other parameters wait for it, or the motor is enabled.
+            NotAllowed: other parameters wait for it, or the axis is enabled.
         """
         drive = self.axis.drive
         if not needs_settings(drive, self.keys):
@@ -209,7 +209,7 @@ class ForcingSession:
 class ForcingSessions:
     """All sessions of a bench; one per drive and kind.
 
-    ``taken_by`` names the person who controls a drive by another connection than the given one.
+    ``taken_by`` returns the person who controls a drive from a connection other than the given.
     """
 
     def __init__(self, jobs: JobRunner, taken_by: Callable[[str, str | None], str | None]) -> None:
@@ -218,16 +218,17 @@ class ForcingSessions:
         self._sessions: dict[tuple[str, str], ForcingSession] = {}
 
     def get(self, drive: str, name: str) -> ForcingSession | None:
-        """The session that runs, or None."""
+        """The running session, or None."""
         return self._sessions.get((drive, name))
 
     async def start(
         self, axis: Axis, name: str, *, confirmed: bool, connection: str | None
     ) -> ForcingSession:
-        """Begin to overrule terminals; none is overruled yet.
+        """Begin a session; no terminal is overridden yet.
 
         Raises:
-            NotAllowed: the drive cannot, a warning was not agreed to, or a session runs already.
+            NotAllowed: the drive does not support it, a warning was not confirmed, or a session
+                runs already.
         """
         drive = axis.drive
         spec = require_forcing(drive, name)
@@ -262,7 +263,7 @@ class ForcingSessions:
         return session
 
     async def end(self, drive: str, name: str, reason: Text = _ENDED) -> None:
-        """Release everything; returns when it is restored.
+        """End a session; returns when everything is restored.
 
         Raises:
             DriveError: not everything could be restored.
@@ -305,12 +306,12 @@ class ForcingSessions:
                 finally:
                     await shielded(session.shut, CLEANUP_TIMEOUT_S, axis.drive.name)
         finally:
-            # The real terminals must count again even if somebody enabled the axis meanwhile.
+            # The real terminals must be in effect again even if the axis was enabled meanwhile.
             await shielded(lambda: self._act(session), CLEANUP_TIMEOUT_S, axis.drive.name)
         return sentence("reason", session.reason)
 
     async def _act(self, session: ForcingSession) -> None:
-        """Make what was restored act; where that fails it is pending like the values themselves."""
+        """Put restored values into effect; on failure they stay on the restore list."""
         drive = session.axis.drive
         try:
             await apply_settings(session.axis, session.keys)
@@ -319,7 +320,7 @@ class ForcingSessions:
             raise
 
     async def _watch(self, session: ForcingSession, progress: Progress) -> None:
-        """Until there is a reason to end."""
+        """Wait until there is a reason to end the session."""
         stopped = session.axis.stopped
         while session.reason is None:
             progress(0.0, _words(session))
@@ -349,12 +350,12 @@ def _words(session: ForcingSession) -> Text:
 
 
 def needs_settings(drive: Drive, keys: tuple[str, ...]) -> bool:
-    """Whether these parameters act only after "write settings"."""
+    """Whether any of these parameters takes effect only after "write settings"."""
     return any(drive.parameter(key).effective == "write_settings" for key in keys)
 
 
 async def apply_settings(axis: Axis, keys: tuple[str, ...]) -> None:
-    """Make these parameters act, where the family needs a command for it."""
+    """Put these parameters into effect, where the family needs a command for it."""
     drive = axis.drive
     quirk = drive.profile.quirk("write_settings")
     if quirk is None or quirk.key is None or quirk.raw is None or not needs_settings(drive, keys):
@@ -365,10 +366,10 @@ async def apply_settings(axis: Axis, keys: tuple[str, ...]) -> None:
 
 
 def require_forcing(drive: Drive, name: str) -> Forcing:
-    """How this family overrules terminals.
+    """How this family overrides terminals.
 
     Raises:
-        NotAllowed: it cannot, or not over the connected port.
+        NotAllowed: it does not support it, or not over the connected port.
     """
     found = functions_of(drive.profile).terminals.forcing
     spec = next((each for each in found if each.name == name), None)

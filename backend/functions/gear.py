@@ -1,4 +1,4 @@
-"""Writes an electronic gear as one step: all of it, or what was there before."""
+"""Writing an electronic gear as one step: all values are written, or all are restored."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.errors import DriveError, NotAllowed, Rejected
 from drivers.texts.message import Text, joined, text
 from profiles.schema import Raw
 
-#: Numbers that keep their value and so change their meaning with the gear.
+#: Roles whose values stay the same and so change their meaning with the gear.
 _COUNTED_ROLES = (
     "software_limit_min", "software_limit_max", "home_offset", "following_error_window",
     "profile_velocity", "profile_acceleration", "profile_deceleration",
@@ -25,7 +25,11 @@ _COUNTED_ROLES = (
 
 @dataclass(frozen=True, slots=True)
 class GearChange:
-    """What was written: ``before`` undoes it; ``waits`` is what must happen before it acts."""
+    """A written gear.
+
+    ``before``: raw values that undo it, by key. ``waits``: keys not in effect yet, each with the
+    action it waits for.
+    """
 
     before: dict[str, int]
     waits: dict[str, str]
@@ -35,13 +39,14 @@ async def plan(axis: Axis, mechanics: Mechanics) -> GearPlan:
     """Gear parameters for these mechanics, with the encoder that the drive reports.
 
     Raises:
-        OutOfRange: they do not fit. DriveError: the drive cannot be asked.
+        OutOfRange: the mechanics do not fit the drive's parameters.
+        DriveError: the encoder's resolution cannot be read.
     """
     return plan_gear(axis.drive.profile, mechanics, await encoder_counts(axis.drive))
 
 
 def counted_in_increments(axis: Axis) -> list[str]:
-    """Parameters whose numbers mean something else under another gear."""
+    """Keys of parameters whose values have another meaning under another gear."""
     drive = axis.drive
     found = []
     for role in _COUNTED_ROLES:
@@ -52,11 +57,12 @@ def counted_in_increments(axis: Axis) -> list[str]:
 
 
 async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
-    """Write all values, each read back; on a failure those written before are restored.
+    """Write all values, each read back; on a failure those already written are restored.
 
     Raises:
-        NotAllowed: the axis is enabled. Rejected: the drive keeps another value.
-        DriveError: a write failed; the message says what could not be restored.
+        NotAllowed: the axis is enabled.
+        Rejected: the drive keeps another value.
+        DriveError: a write failed; the message states what could not be restored.
     """
     drive = axis.drive
     if await axis.state() is State.OPERATION_ENABLED:
@@ -65,12 +71,12 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
     for value in values:
         before[value.parameter.key] = await drive.raw(value.parameter.key)
     done: list[str] = []
-    # For the next server, should this one be killed with half a gear written.
+    # On the restore list in case this server is killed with half of the gear written.
     with drive.pending_restores.temporary(before):
         try:
             await _write_all(axis, values, before, done)
         except BaseException as error:
-            # Half a gear is another scale: whoever moves next would go to another place.
+            # Half of a gear is another scale: the next move would go to a wrong position.
             taken_back = _put_back(axis, {key: before[key] for key in reversed(done)}, error)
             await shielded(lambda: taken_back, CLEANUP_TIMEOUT_S, drive.name)
             raise
@@ -83,7 +89,7 @@ async def write_gear(axis: Axis, values: Sequence[GearValue]) -> GearChange:
 async def _write_all(
     axis: Axis, values: Sequence[GearValue], before: dict[str, int], done: list[str]
 ) -> None:
-    """``done`` gets the key of every write before it goes out."""
+    """Write the values; the key of every write is added to ``done`` before it is sent."""
     drive = axis.drive
     for value in values:
         key = value.parameter.key

@@ -1,7 +1,7 @@
-"""Braking energy and the resistor that must take it: pure, in SI units.
+"""Braking energy and the braking resistor for it, in SI units, without I/O.
 
-Equations 9, 11 and 12 of manual 004 (004:2250 to 004:2300), which are the energy balance of a mass
-that is braked: what the capacitors of the DC bus do not take up must go into the resistor.
+Equations 9, 11 and 12 of manual 004 (004:2250 to 004:2300), the energy balance of braking: energy
+that the capacitors of the DC bus cannot store must be dissipated by the resistor.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from drivers.errors import OutOfRange
 
 @dataclass(frozen=True, slots=True)
 class BrakingCycle:
-    """What is braked, how hard and how often.
+    """A braking cycle.
 
-    ``inertia_kgm2`` is that of motor and load together at the motor's shaft. ``efficiency`` is
-    the part of the kinetic energy that comes back to the drive (1 is the safe assumption).
-    ``fall_energy_j`` is what a vertical axis gives back in one cycle besides.
+    ``inertia_kgm2``: motor and load together, at the motor's shaft. ``efficiency``: share of the
+    kinetic energy that returns to the drive (1 is the safe assumption). ``fall_energy_j``:
+    additional energy that a vertical axis returns in one cycle.
     """
 
     inertia_kgm2: float
@@ -33,7 +33,7 @@ class BrakingCycle:
 
 @dataclass(frozen=True, slots=True)
 class Resistor:
-    """A resistor: its value and the power it may dissipate for long."""
+    """A braking resistor: its resistance and its continuous power."""
 
     resistance_ohm: float
     power_w: float
@@ -41,7 +41,7 @@ class Resistor:
 
 @dataclass(frozen=True, slots=True)
 class BrakingLimits:
-    """What the drive offers and allows; None where the manual prints nothing."""
+    """Capabilities and limits of the drive; None where the manual does not state them."""
 
     capacitor_j: float = 0.0
     built_in: Resistor | None = None
@@ -57,8 +57,8 @@ Verdict = Literal["capacitor", "built_in", "external", "beyond", "unknown"]
 class BrakingResult:
     """Energies of one stop in J, powers in W, resistances in Ω.
 
-    ``verdict``: the capacitors are enough; the built-in resistor is; an external one is needed
-    (``external_w`` and the range of ohms); more than the drive allows; or no limit is known.
+    ``verdict``: the capacitors suffice; the built-in resistor suffices; an external one is needed
+    (``external_w``, ``min_ohm``, ``max_ohm``); more than the drive permits; or no limit is known.
     """
 
     kinetic_j: float
@@ -74,12 +74,12 @@ class BrakingResult:
 
 
 def braking(cycle: BrakingCycle, limits: BrakingLimits) -> BrakingResult:
-    """Energy and power of a cycle against the limits of the drive.
+    """Energy and power of a cycle, compared with the limits of the drive.
 
-    The greatest resistance still passes the peak power at the threshold voltage, V²/R ≥ P.
+    The largest resistance still dissipates the peak power at the threshold voltage, V²/R ≥ P.
 
     Raises:
-        OutOfRange: the stops take longer than the cycle in which they are said to happen.
+        OutOfRange: the stops take longer than the cycle.
     """
     stopping_s = cycle.deceleration_s * cycle.stops_per_cycle
     if not stopping_s <= cycle.cycle_s:
@@ -123,7 +123,7 @@ def _verdict(average_w: float, peak_w: float, limits: BrakingLimits) -> Verdict:
     built_in = limits.built_in
     if built_in is not None and average_w <= built_in.power_w:
         volts = limits.on_voltage_v
-        # What the resistor cannot pass at the threshold raises the bus voltage further.
+        # Power that the resistor cannot dissipate at the threshold raises the bus voltage further.
         if volts is None or peak_w <= volts**2 / built_in.resistance_ohm:
             return "built_in"
     if limits.max_external_w is not None:

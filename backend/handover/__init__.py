@@ -1,1 +1,1 @@
-"""Hand-over of tuned values to a machine controller, and what its own list would write."""
+"""Hand-over of tuned values to a machine's controller, and comparison with its own list."""

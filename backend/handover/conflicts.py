@@ -1,4 +1,4 @@
-"""What a controller's list would overwrite, and what is wrong with the list itself."""
+"""Values that a controller's list would overwrite, and defects of the list itself."""
 
 from __future__ import annotations
 
@@ -44,17 +44,17 @@ _OVERWRITES: dict[Consequence, str] = {
     "motion": "handover.overwrites-motion",
     "other": "handover.overwrites-other",
 }
-#: On the way up, with the mailbox working (ETG.1000.6); empty where the format states none.
+#: Upward transitions in which the mailbox works (ETG.1000.6); empty where a format states none.
 _STATES = ("IP", "PS", "SO", "")
-#: Objects that set the process data up, which every list writes (ETG.1000.6 clause 5.6.7).
+#: Objects that configure the process data, which every list writes (ETG.1000.6 clause 5.6.7).
 _PDO_OBJECTS = (range(0x1600, 0x1800), range(0x1A00, 0x1C00), range(0x1C12, 0x1C14))
 
 
 @dataclass(frozen=True, slots=True)
 class Conflict:
-    """A value that the controller writes and that is another one than ours.
+    """A value that the controller writes and that differs from ours.
 
-    Raw values: ``ours`` of the set, ``drive`` of the drive as it is; None where they are not known.
+    Raw values: ``ours`` of the set, ``drive`` of the drive now; None where they are not known.
     Where the set has no such value, that of the drive counts.
     """
 
@@ -69,7 +69,7 @@ class Conflict:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A defect of the list, which the machine would find at start-up or later."""
+    """A defect of the list, which would cause an error of the machine at start-up or later."""
 
     kind: Defect
     key: str
@@ -79,24 +79,24 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A comparison: conflicts in the order of the list, and defects."""
+    """Result of a comparison: conflicts in the order of the list, and defects."""
 
     conflicts: tuple[Conflict, ...]
     findings: tuple[Finding, ...]
     not_written: tuple[str, ...]
-    """Keys of our set that the controller does not write: these stay as the drive keeps them."""
+    """Keys of our set that the controller does not write; they keep their values in the drive."""
     restored: tuple[str, ...]
-    """Keys whose value in the drive is another one now; the controller writes that of our set."""
+    """Keys whose value in the drive has changed and to which the controller writes our value."""
     unknown_here: tuple[str, ...]
-    """Keys that the controller writes and of which neither set nor drive gives a value."""
+    """Keys that the controller writes and for which neither set nor drive has a value."""
     not_read: tuple[str, ...]
-    """Keys that the controller writes and of which the drive, though asked, gave no value: whether
-    the controller changes them there is not known."""
+    """Keys that the controller writes and that could not be read from the drive, so that it is not
+    known whether the controller changes them."""
     same: int
 
 
 def value_of(profile: Profile, write: Listed) -> Raw | None:
-    """The raw value of a write, None where the object is unknown or its size another."""
+    """The raw value of a write; None where the object is unknown or has another size."""
     parameter = profile.by_key.get(write.key)
     if parameter is None or size_of(parameter.type) not in (None, len(write.data)):
         return None
@@ -104,7 +104,7 @@ def value_of(profile: Profile, write: Listed) -> Raw | None:
 
 
 def resolved(profile: Profile, listed: ControllerList) -> tuple[StartupWrite, ...]:
-    """The list as writes of ours, which can be exported again; unknown objects are not in it."""
+    """The list as start-up writes, which can be exported again; without unknown objects."""
     found = []
     for write in listed.writes:
         raw = value_of(profile, write)
@@ -120,7 +120,7 @@ def compare(
     ours: Mapping[str, Raw] | None,
     drive: Mapping[str, Raw | None] | None,
 ) -> Verdict:
-    """Set against the controller's list against the drive, each where it is given.
+    """Compare the controller's list with the set and with the drive, each where it is given.
 
     The last write of an object counts, as it does in the drive.
     """
@@ -168,7 +168,7 @@ def compare(
 def changed_since(
     profile: Profile, ours: Mapping[str, Raw], drive: Mapping[str, Raw | None]
 ) -> tuple[Conflict, ...]:
-    """Values of a set that the drive no longer holds; what could not be read is left out."""
+    """Values of a set that have changed in the drive; values that were not read are left out."""
     found = []
     for key, raw in ours.items():
         parameter, now = profile.by_key.get(key), drive.get(key)
@@ -183,7 +183,7 @@ def changed_since(
 
 
 def _equal(parameter: Parameter, one: Raw, other: Raw) -> bool:
-    """Equal on the wire: a REAL32 that was typed has more digits than it carries."""
+    """Whether both values have the same bytes; a typed REAL32 has more digits than its type."""
     try:
         return encode(parameter.type, one) == encode(parameter.type, other)
     except DriveError:
@@ -191,7 +191,7 @@ def _equal(parameter: Parameter, one: Raw, other: Raw) -> bool:
 
 
 def shown(parameter: Parameter, raw: Raw) -> str:
-    """A raw value in the parameter's unit; raw where the unit or the scale changes nothing."""
+    """A raw value in the parameter's unit, with the raw value where it differs."""
     value = parameter.to_value(raw)
     unit = f" {parameter.unit}" if parameter.unit else ""
     return f"{value}{unit}" + (f" (raw {raw})" if value != raw else "")
@@ -215,7 +215,7 @@ def _conflict(
 
 
 def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
-    """Defects of a list by the family's profile."""
+    """Defects of a list according to the family's profile."""
     found: list[Finding] = []
     seen: dict[str, Text] = {}
     highest, before = -2, ""
@@ -223,7 +223,8 @@ def diagnose(profile: Profile, listed: ControllerList) -> tuple[Finding, ...]:
         parameter = profile.by_key.get(write.key)
 
         note = partial(_noted, found, write)
-        # A list of PDOs or of their objects is emptied, filled and given its length at last.
+        # A PDO assignment or mapping is cleared, filled and then given its length, so several
+        # writes of one object are normal.
         fills_pdo = any(write.index in each for each in _PDO_OBJECTS)
         if write.key in seen and not fills_pdo:
             note("twice", before=seen[write.key])
@@ -249,7 +250,7 @@ def _noted(found: list[Finding], at: Listed, kind: Defect, /, **facts: Param) ->
 
 
 class _Note(Protocol):
-    """The function that notes a finding."""
+    """Function that records a finding."""
 
     def __call__(self, kind: Defect, /, **facts: Param) -> None: ...
 

@@ -1,8 +1,8 @@
-"""EtherCAT network information (ENI, ETG.2100) of a segment, ready for a master that runs it.
+"""EtherCAT network information (ENI, ETG.2100) of a segment, ready to run in a master.
 
-Element names, their order and the register commands follow files that TwinCAT writes; addresses
-of mailboxes and sync managers come from each drive's ESI file. Without these a slave is written
-with its start-up list alone, which a configurator reads and no master runs.
+Element names, their order and the register commands follow files written by TwinCAT; addresses of
+mailboxes and sync managers come from each drive's ESI file. Without ESI files a slave has its
+start-up list alone, which a configurator can read but a master cannot run.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _TYPES = {
 
 
 def is_complete(axes: Sequence[AxisHandover]) -> bool:
-    """Whether a master can run the ENI: every drive's controller is known, and its process data."""
+    """Whether a master can run the ENI: slave controllers and process data are all known."""
     return all(axis.controller is not None and axis.pdos for axis in axes)
 
 
@@ -102,7 +102,7 @@ def _bytes_of(axis: AxisHandover, direction: str) -> int:
 
 
 def _clock(axis: AxisHandover) -> int:
-    """AssignActivate, 0 where the drive runs without a clock."""
+    """AssignActivate; 0 where the drive runs without distributed clocks."""
     return axis.controller.assign_activate if axis.controller is not None else 0
 
 
@@ -193,7 +193,7 @@ def _dc(slave: Element, place: Place, cycle_us: int, *, complete: bool) -> None:
 
 
 def _assignment(commands: Element, axis: AxisHandover, controller: SlaveController) -> None:
-    """PDOs as they are expected (ETG.1000.6 clause 5.6.7), as far as the drive lets them be set."""
+    """Write the PDO assignment and mapping (ETG.1000.6 clause 5.6.7), as far as they can be set."""
 
     def write(comment: str, index: int, subindex: int, data: bytes) -> None:
         command = child(commands, "InitCmd", Fixed="1")
@@ -278,14 +278,14 @@ def _type(entry: MappedEntry) -> str:
 
 
 def _frame(frame: Element, places: Sequence[Place], clocked: Sequence[Place]) -> int:
-    """Datagrams of one cycle; returns the size of the frame."""
+    """Add the datagrams of one cycle; return the size of the frame [bytes]."""
     at = _ETHERNET_AND_HEADER
     if clocked:
         first = clocked[0].auto_increment
         states = ("PREOP", "SAFEOP", "OP")
         at = _command(frame, states, _ARMW, at, 8, adp=first, ado=_DC_TIME)
     total = sum(place.out_bytes + place.in_bytes for place in places)
-    # ETG.1000.4 clause 5.4: in a read-write command reading counts 1 and writing 2.
+    # Working counter of a read-write command: reading counts 1, writing 2 (ETG.1000.4 clause 5.4).
     count = sum(2 * bool(place.out_bytes) + bool(place.in_bytes) for place in places)
     at = _command(frame, ("SAFEOP", "OP"), _LRW, at, total, address=LOGICAL, count=count)
     states = ("PREOP", "SAFEOP", "OP")

@@ -1,6 +1,6 @@
-"""Register commands of an ENI: what a master sends to a slave in every transition.
+"""Register commands of an ENI, which a master sends to a slave in every transition.
 
-Their order and comments follow files that TwinCAT writes; a master knows some by their comment.
+Their order and comments follow files written by TwinCAT; masters identify some by their comment.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from profiles.importer.esi_controller import SlaveController, SyncManager
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _APRD, _APWR, _FPRD, _FPWR = 1, 2, 4, 5
 _FIRST_ADDRESS = 1001
-#: Where the process data of a segment begin in logical memory.
+#: Logical address of the process data of a segment.
 LOGICAL = 0x0100_0000
 _AL_CONTROL, _EEPROM = 0x120, 0x500
 #: Registers that master and slaves both use: AL status, configured address, FMMUs, sync managers.
 AL_STATUS, ADDRESS, FMMU, SYNC_MANAGERS = 0x130, 0x10, 0x600, 0x800
-#: 100 µs times 1000: the controllers' own default (ETG.1000.4 clause 6.3), written out.
+#: Watchdog of 100 µs × 1000, written explicitly; it is the default (ETG.1000.4 clause 6.3).
 _WATCHDOG = ((0x400, 2498), (0x420, 1000))
 _TIMEOUTS_MS = {1: 3000, 2: 3000, 4: 10000, 8: 10000}
 _DOWNWARD = ("SI", "OI", "SP", "OP")
@@ -30,7 +30,7 @@ _DOWNWARD = ("SI", "OI", "SP", "OP")
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A slave's place in segment and frame; offsets are bytes within the LRW datagram."""
+    """Position of a slave in segment and frame; offsets in bytes within the LRW datagram."""
 
     axis: AxisHandover
     position: int
@@ -56,8 +56,8 @@ def register_command(
 ) -> Element:  # fmt: skip
     """One register access at these transitions.
 
-    ``count`` is the working counter to expect; ``validate`` data, mask and time-out in ms of a
-    read that is repeated until it fits.
+    ``count``: expected working counter. ``validate``: data, mask and timeout [ms] of a read that is
+    repeated until it matches.
     """
     made = child(commands, "InitCmd")
     for transition in when:
@@ -83,7 +83,7 @@ def register_command(
 def slave_registers(
     commands: Element, place: Place, controller: SlaveController, cycle_us: int
 ) -> None:
-    """Register writes of every transition, in the order in which a master sends them."""
+    """Register commands of every transition, in the order in which a master sends them."""
     position, address = place.auto_increment, place.address
     vendor, product = place.axis.identity()
     _state(commands, ("PI", "SI", "OI", "IP"), _APWR, position, 1)
@@ -124,7 +124,7 @@ def slave_registers(
 
 
 def _state(commands: Element, when: Sequence[str], command: int, address: int, state: int) -> None:
-    """Ask for a state, acknowledging an error on the way up from Init, and wait for it."""
+    """Request an AL state and wait for it; Init and Pre-Op also acknowledge an error."""
     name = {1: "INIT", 2: "PREOP", 4: "SAFEOP", 8: "OP"}[state]
     data = bytes([state | (0x10 if state <= 2 else 0), 0])
     text = f"device state {name}"
@@ -145,7 +145,7 @@ def _manager(commands: Element, when: str, address: int, manager: SyncManager, l
 
 
 def _fmmus(commands: Element, place: Place, controller: SlaveController) -> None:
-    """Logical to physical memory (ETG.1000.4 clause 6.6): type 2 is written, type 1 is read."""
+    """Map logical to physical memory (ETG.1000.4 clause 6.6); type 2: written, type 1: read."""
     for number, (kind, at, size, way) in enumerate(
         (("outputs", place.out_at, place.out_bytes, 2), ("inputs", place.in_at, place.in_bytes, 1))
     ):
@@ -159,7 +159,7 @@ def _fmmus(commands: Element, place: Place, controller: SlaveController) -> None
 
 
 def _sync(commands: Element, address: int, controller: SlaveController, cycle_us: int) -> None:
-    """SYNC0 (ETG.1000.4 clause 6.8). The master fills in a start time of 0."""
+    """Activate SYNC0 (ETG.1000.4 clause 6.8). The master replaces the start time 0."""
     cycle = struct.pack("<II", cycle_us * 1000, 0)
     activate = struct.pack("<H", controller.assign_activate)
     for text, register, data in (

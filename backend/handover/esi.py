@@ -1,4 +1,4 @@
-"""Controllers of slaves out of makers' ESI files, with the errors of a hand-over."""
+"""Slave controllers from makers' ESI files, with the errors of a hand-over."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from profiles.importer.esi_controller import (
 def controllers_of(
     sources: Iterable[tuple[bytes, str]], wanted: Sequence[Wanted]
 ) -> tuple[SlaveController, ...]:
-    """See `read_controllers`, in this process: for files of who has started it.
+    """Read slave controllers in this process, for trusted files; see `read_controllers`.
 
     Raises:
-        BadSet: a file is no ESI file, or one that is damaged.
-        NotAllowed: no file has such a device, or one without CoE mailboxes.
+        BadSet: a file is not an ESI file, or is damaged.
+        NotAllowed: no file has such a device, or the device has no CoE mailboxes.
     """
     try:
         return read_controllers(sources, wanted)
@@ -43,7 +43,7 @@ def controller_of(
 
 
 def reported_controllers(answer: Mapping[str, Any]) -> tuple[SlaveController, ...]:
-    """What `ControllersTask` answered; raises what `controllers_of` raises."""
+    """Slave controllers from the answer of `ControllersTask`; raises as `controllers_of`."""
     if "refused" in answer:
         raise _refusal(message_of_import(answer["refused"]), sound=answer["sound"])
     return tuple(

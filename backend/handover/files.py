@@ -1,4 +1,4 @@
-"""The files of a hand-over, by format: the list itself and what lies next to it."""
+"""The files of a hand-over, by format: the list itself and its accompanying files."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from profiles.importer.esi_controller import SlaveController, Wanted
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)
-#: Formats that hold a whole segment.
+#: Formats that can contain a whole segment.
 SEGMENT_FORMATS: tuple[Format, ...] = ("eni", "lcec", "ros2")
-#: What a file of the format is usually called, for who gives no name.
+#: Usual file suffix of each format, for a file without a given name.
 SUFFIXES: dict[Format, str] = {
     "twincat": ".xml", "codesys": ".csv", "eni": ".xml", "lcec": ".xml", "ros2": ".yaml",
     "igh": ".sh", "dcf": ".dcf", "csv": ".csv", "python": ".py",
@@ -32,13 +32,13 @@ _ETHERCAT_ONLY = ("twincat", "codesys", "eni", "lcec", "igh")
 def files_of(
     what: AxisHandover | Sequence[AxisHandover], form: Format, name: str, saved: datetime | None
 ) -> dict[str, bytes]:
-    """File names and contents; the first one is the list, the last ones are the scaling sheets.
+    """File names and contents; the first is the list, the last ones are the scaling sheets.
 
-    Several drives are a segment in the order of the cable.
+    Several drives form a segment in the order of the cable.
 
     Raises:
         NotAllowed: the drive is not on such a bus, the format needs an identity that is unknown,
-            or holds one drive alone.
+            or the format is for a single drive.
     """
     axes = [what] if isinstance(what, AxisHandover) else list(what)
     if not axes or (len(axes) > 1 and form not in SEGMENT_FORMATS):
@@ -59,16 +59,16 @@ def files_of(
 
 
 def fitting(axis: AxisHandover, form: Format) -> AxisHandover:
-    """The axis with what this format can carry; the rest is left out, with its reason.
+    """The axis with the writes that this format can express; others are left out, with the reason.
 
     Raises:
-        NotAllowed: the format carries nothing of it.
+        NotAllowed: the format cannot express any of them.
     """
     return ros2_files.carried(axis) if form == "ros2" else axis
 
 
 def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[Text, ...]:
-    """What a person must know of this very format before the file is used."""
+    """Notes on this format that a person must know before using the file."""
     found = []
     if form == "eni" and not is_complete(axes):
         found.append(text("handover.note-incomplete-eni"))
@@ -81,10 +81,10 @@ def remarks(axes: Sequence[AxisHandover], form: Format) -> tuple[Text, ...]:
 
 
 def wanted_of(axes: Sequence[AxisHandover]) -> tuple[Wanted, ...]:
-    """The identities by which the drives' devices are found in ESI files.
+    """Identities by which the devices are found in ESI files.
 
     Raises:
-        NotAllowed: identity unknown.
+        NotAllowed: an identity is unknown.
     """
     return tuple((*axis.identity(), axis.revision) for axis in axes)
 
@@ -92,12 +92,12 @@ def wanted_of(axes: Sequence[AxisHandover]) -> tuple[Wanted, ...]:
 def with_controllers(
     axes: Sequence[AxisHandover], controllers: Sequence[SlaveController]
 ) -> list[AxisHandover]:
-    """Each axis with the controller of its own ESI file."""
+    """Each axis with the slave controller of its own ESI file."""
     return [replace(axis, controller=found) for axis, found in zip(axes, controllers, strict=True)]
 
 
 def digest(data: bytes) -> str:
-    """SHA-256 of a file, by which a report names it."""
+    """SHA-256 of a file, by which a report identifies it."""
     return hashlib.sha256(data).hexdigest()
 
 

@@ -1,4 +1,4 @@
-"""Rows of a controller's list and the words in them, whatever its format. Pure."""
+"""Rows of a controller's list and their fields, for all formats. Without I/O."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class Listed:
 
     @property
     def key(self) -> str:
-        """As a profile's key, 6081:00."""
+        """The object as a profile's key, such as 6081:00."""
         return f"{self.index:04X}:{self.subindex:02X}"
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerList:
-    """A list: its format and writes in their order; ``ordered`` shows whether order counts."""
+    """A list: its format and its writes in order; ``ordered``: whether the order is significant."""
 
     format: str
     writes: tuple[Listed, ...]
@@ -37,7 +37,7 @@ class ControllerList:
 
 
 class BadRow(Unsuitable):
-    """A row that cannot be read; the message has its place."""
+    """A row cannot be read; the message contains its place."""
 
 
 def line_of(line: int) -> Text:
@@ -46,7 +46,7 @@ def line_of(line: int) -> Text:
 
 
 class SeveralSlaves(ValueError):
-    """A file writes to several slaves, and nobody said which one is meant."""
+    """A file writes to several slaves, and none was chosen."""
 
     def __init__(self, slaves: int) -> None:
         super().__init__(f"{slaves} slaves")
@@ -54,10 +54,10 @@ class SeveralSlaves(ValueError):
 
 
 def chosen(each: Sequence[_T], slave: int | None) -> _T:
-    """The only one, or the one that was asked for, counted from 1.
+    """The only slave, or the chosen one, counted from 1.
 
     Raises:
-        SeveralSlaves: it is not clear which.
+        SeveralSlaves: none was chosen among several, or there is no such slave.
     """
     if slave is None and len(each) == 1:
         return each[0]
@@ -73,14 +73,14 @@ def number(written: str | None, place: Text, *, base: int = 0) -> int:
         if word.lower().startswith(prefix):
             word, base = word[len(prefix) :], 16
     try:
-        # A decimal with leading zeros is none of Python's, but of everybody else's.
+        # Python does not accept decimals with leading zeros at base 0; other programs write them.
         return int(word, base or 10)
     except ValueError as error:
         raise BadRow(text("handover.row-no-number", place=place, word=word[:40])) from error
 
 
 def listed(index: int, subindex: int, data: bytes, transition: str, place: Text) -> Listed:
-    """A write to an object that can exist, with data."""
+    """A write, after a check that its object can exist and that it has data."""
     if not 0 <= index <= 0xFFFF or not 0 <= subindex <= 0xFF:
         key = f"{index:X}h:{subindex}"[:40]
         raise BadRow(text("handover.row-no-object", place=place, key=key))
@@ -90,7 +90,7 @@ def listed(index: int, subindex: int, data: bytes, transition: str, place: Text)
 
 
 def row_of_bytes(written: str | None, place: Text) -> bytes:
-    """Bytes in hex."""
+    """Bytes from hexadecimal digits."""
     try:
         return bytes.fromhex((written or "").strip())
     except ValueError as error:
@@ -99,9 +99,9 @@ def row_of_bytes(written: str | None, place: Text) -> bytes:
 
 
 def sized(value: int, size: int, place: Text) -> bytes:
-    """A whole number, signed or not, in so many bytes."""
+    """An integer, signed or unsigned, as ``size`` bytes, little endian."""
     if not -(1 << (8 * size - 1)) <= value < 1 << (8 * size):
-        # As words: a number of a damaged file may be longer than any real one.
+        # As text, since a number in a damaged file may have any length.
         raise BadRow(
             text("handover.row-too-large", place=place, number=str(value)[:40], bytes=size)
         )

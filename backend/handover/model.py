@@ -1,6 +1,6 @@
-"""What is handed over: start-up writes of one axis, with its process data and cycle.
+"""Contents of a hand-over: start-up writes of one axis, with process data and cycle time.
 
-Pure: a parameter set and the family's profile in, writes out. Nothing here reaches a bus.
+Computed from a parameter set and the family's profile, without I/O.
 """
 
 from __future__ import annotations
@@ -22,18 +22,19 @@ Consequence = Literal["motion", "unit", "limit", "gain", "other"]
 Choice = Literal["all", "tuned", "not_default"]
 
 #: CoE start-up values are written from Pre-Operational to Safe-Operational (ETG.1000.6: SDO works
-#: from Pre-Operational on), before process data flow. No profile names an object that needs later.
+#: from Pre-Operational on), before process data are exchanged. No profile has an object that must
+#: be written later.
 DEFAULT_TRANSITION: Transition = "PS"
-#: Code of the note that names the values which process data overwrite.
+#: Code of the note about values that process data overwrite.
 OVERWRITTEN = "handover.note-process-data-overwrite"
-#: By when a written value acts, of those that do not act at once: the code of the note.
+#: Codes of the notes about values that do not take effect at once, by the event they need.
 _ACT_AFTER = {
     "power_cycle": "handover.note-act-after-power-cycle",
     "write_settings": "handover.note-act-after-write-settings",
 }
-#: Cycle that is proposed where the profile prints no longer minimum.
+#: Proposed cycle time [µs], unless the profile's minimum is longer.
 PROPOSED_CYCLE_US = 1000
-#: SYNC0 without SYNC1 (ETG.1020 AssignActivate); the drive's ESI file has the last word.
+#: SYNC0 without SYNC1 (ETG.1020 AssignActivate); the value of the drive's ESI file has priority.
 ASSIGN_ACTIVATE = 0x0300
 
 _UNITS = {"607E", "608F", "6091", "6092", "6093", "6096", "6097", "60A8", "60A9", "60AA", "60AB"}
@@ -46,7 +47,7 @@ _RANK: dict[Consequence, int] = {"unit": 0, "limit": 1, "motion": 2, "other": 2,
 
 @dataclass(frozen=True, slots=True)
 class StartupWrite:
-    """One SDO download of a start-up list. ``raw`` travels little endian in the type's size."""
+    """One SDO download of a start-up list. ``raw`` is sent little endian in the type's size."""
 
     index: int
     subindex: int
@@ -59,7 +60,7 @@ class StartupWrite:
 
     @property
     def data(self) -> bytes:
-        """Bytes as they travel (CiA 301 clause 7.1.4)."""
+        """Bytes as transferred (CiA 301 clause 7.1.4)."""
         return encode(self.type, self.raw)
 
     @property
@@ -70,7 +71,7 @@ class StartupWrite:
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """A row of the set that is not handed over, and why."""
+    """A row of the set that is not handed over, and the reason."""
 
     key: str
     reason: Text
@@ -99,7 +100,7 @@ class MappedPdo:
 
 @dataclass(frozen=True, slots=True)
 class AxisHandover:
-    """Everything that a format writes down about one axis."""
+    """All data about one axis that a format may contain."""
 
     name: str
     profile: Profile
@@ -113,20 +114,20 @@ class AxisHandover:
     distributed_clock: bool
     notes: tuple[Text, ...] = ()
     controller: SlaveController | None = None
-    """Of the drive's ESI file, where one was given."""
+    """Slave controller of the drive's ESI file, where one was given."""
 
     @property
     def assign_activate(self) -> int:
-        """Word that switches the clock on, of the ESI file or proposed; 0 for none."""
+        """AssignActivate word for distributed clocks, of the ESI file or proposed; 0 for none."""
         if self.controller is not None:
             return self.controller.assign_activate
         return ASSIGN_ACTIVATE if self.distributed_clock else 0
 
     def identity(self) -> tuple[int, int]:
-        """Vendor and product, which a controller compares with the drive.
+        """Vendor ID and product code, which a controller compares with the drive.
 
         Raises:
-            NotAllowed: the set does not state them, nor does the profile.
+            NotAllowed: neither the set nor the profile states them.
         """
         if self.vendor_id is None or self.product_code is None:
             raise NotAllowed("handover.set-states-neither-vendor", drive=self.name)
@@ -134,8 +135,10 @@ class AxisHandover:
 
 
 def gain_keys(profile: Profile) -> frozenset[str]:
-    """Keys that tuning changes: the maker's groups of loop gains, of feed-forward and of filters as
-    the profile names them, notches and stiffness."""
+    """Keys that tuning changes.
+
+    These are the profile's groups of loop gains, feedforward and filters, notches and stiffness.
+    """
     found: set[str] = set()
     if (gains := profile.gains) is not None:
         speed = profile.by_key.get(gains.speed or "")
@@ -166,7 +169,7 @@ def gain_keys(profile: Profile) -> frozenset[str]:
 
 
 def consequence(profile: Profile, parameter: Parameter) -> Consequence:
-    """What a wrong value of this parameter spoils, by the profile's data."""
+    """What a wrong value of this parameter affects, according to the profile."""
     if motion_of(parameter) == "energises":
         return "motion"
     units = profile.units
@@ -183,18 +186,18 @@ def consequence(profile: Profile, parameter: Parameter) -> Consequence:
 
 
 def rank(profile: Profile, parameter: Parameter) -> int:
-    """Place in the order of writing: what unlocks the others, units, limits, what else, gains."""
+    """Place in the order of writing: write protection, units, limits, others, gains."""
     return -1 if is_lock(profile, parameter) else _RANK[consequence(profile, parameter)]
 
 
 def is_lock(profile: Profile, parameter: Parameter) -> bool:
-    """Whether the parameter protects the others from being written."""
+    """Whether the parameter is the write protection of the others."""
     quirk = profile.quirk("write_protect")
     return quirk is not None and quirk.key == parameter.key
 
 
 def locks(profile: Profile, parameter: Parameter, raw: Raw) -> bool:
-    """Whether this value makes the drive refuse what is written after it."""
+    """Whether this value makes the drive refuse later writes."""
     quirk = profile.quirk("write_protect")
     return quirk is not None and quirk.key == parameter.key and raw != (quirk.raw or 0)
 
@@ -210,7 +213,7 @@ def hand_over(
     """The start-up writes of a set.
 
     Raises:
-        NotAllowed: the set is of another family, a key of ``only`` is not in it, or nothing is
+        NotAllowed: the set is for another family, a key of ``only`` is not in it, or nothing is
             left to write.
     """
     if content.profile != profile.drive:
@@ -252,7 +255,7 @@ def hand_over(
 
 
 def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> StartupWrite:
-    """The write of a value; ``parameter`` has an object."""
+    """The write of a value; ``parameter`` must have an index."""
     assert parameter.index is not None
     assert parameter.subindex is not None
     return StartupWrite(
@@ -269,7 +272,7 @@ def write_of(parameter: Parameter, raw: Raw, transition: Transition = "PS") -> S
 def _why_not(
     parameter: Parameter | None, raw: Raw | None, *, motor_individual: bool
 ) -> Text | None:
-    """Why a row has no place in a start-up list; None where it has."""
+    """Why a row cannot be in a start-up list; None where it can."""
     if parameter is None:
         return text("handover.left-out-no-parameter")
     if raw is None:
@@ -337,7 +340,7 @@ def _axis(
 
 
 def _pdos(profile: Profile) -> tuple[MappedPdo, ...]:
-    """The two PDOs that are assigned by default, as the profile prints them."""
+    """The two PDOs that are assigned by default, according to the profile."""
     if profile.pdo is None:
         return ()
     found = []

@@ -1,7 +1,7 @@
-"""Start-up lists of a controller, read back: what it will write, in its order.
+"""Reading start-up lists of a controller: its writes in their order.
 
-A file is recognised by its contents, not by its name. What is broken as a whole is refused with one
-error; a bad row is refused with its place, for a list that is read in part compares wrongly.
+A file is recognised by its contents, not by its name. A damaged file is refused with one error. A
+bad row is refused with its place, as a list that is read only in part would compare wrongly.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ from profiles.schema import INTEGER_RANGE, DataType, Profile
 _Row = TypeVar("_Row")
 MAX_BYTES = 8_000_000
 _MAX_WRITES = 20_000
-#: Of XML, twice what 20 000 writes have in a list of ENI with eight elements each.
+#: Largest number of XML tags: twice that of an ENI with 20 000 writes of eight elements each.
 _MAX_TAGS = 640_000
 _CCS_DOWNLOAD = 1
 _UPWARD = ("IP", "PS", "SO")
 _COMMANDS = ".//CoE/InitCmds/InitCmd"
-#: What the parsers raise; LookupError is an encoding that is unknown.
+#: Errors that the parsers raise; LookupError for an unknown encoding.
 _DAMAGED = (
     ParseError,
     ValueError,
@@ -63,23 +63,23 @@ _DAMAGED = (
     csv.Error,
     RecursionError,
 )
-#: Parameters of lcec's drivers that choose pins, PDOs and names; the others are values that the
-#: driver writes to the slave at its start, in a way of its own.
+#: Parameters of lcec's drivers that select pins, PDOs and names. All others are values that the
+#: driver itself writes to the slave at its start.
 _SETS_PINS = re.compile(r"(?:cia|pdo|enable|fsoe)\w*|\w*(?:channels|name)", re.I)
-#: Entries of the objects that say which PDOs and objects the process data hold (ETG.1000.6
-#: clauses 5.6.7.4 and 5.6.7.5): numbers of PDOs, or objects with their lengths.
+#: Size of the entries [bytes] of PDO mapping and PDO assignment objects (ETG.1000.6 clauses 5.6.7.4
+#: and 5.6.7.5): mapped objects with their lengths, or numbers of PDOs.
 _PDO_LISTS = ((range(0x1600, 0x1C00), 4), (range(0x1C10, 0x1C30), 2))
 
 
 def read_list(
     data: bytes, profile: Profile, name: str = "the file", slave: int | None = None
 ) -> ControllerList:
-    """A controller's list in any of the formats that are exported, but the Python script.
+    """A controller's list in any of the exported formats except the Python script.
 
-    ``slave`` counts from 1 in the order of the file, where that has several.
+    ``slave``: number of the slave in a file with several, counted from 1.
 
     Raises:
-        BadSet: too large, of no such format, damaged, or without a single write.
+        BadSet: too large, not such a format, damaged, or without any write.
     """
     if len(data) > MAX_BYTES:
         raise BadSet("handover.larger-bytes", name=name, max_bytes=MAX_BYTES)
@@ -135,12 +135,12 @@ def _by_contents(data: bytes, profile: Profile, name: str, slave: int | None) ->
 
 
 def _first(rows: Iterator[_Row]) -> Iterator[_Row]:
-    """The rows up to the first that is too many: what lies behind it is not worth its time."""
+    """The rows up to the first one beyond the limit; the rest is not read, to save time."""
     return islice(rows, _MAX_WRITES + 1)
 
 
 def _of_slave(downloads: Iterable[read_text.Download], slave: int | None) -> list[Listed]:
-    """A script may write to several slaves: those of one, in the order in which they come."""
+    """The writes to one slave of a script, in their order; a script may write to several slaves."""
     found: dict[tuple[str, str, str], list[Listed]] = {}
     for each in downloads:
         found.setdefault(each.slave, []).append(each.write)
@@ -150,7 +150,7 @@ def _of_slave(downloads: Iterable[read_text.Download], slave: int | None) -> lis
 def _xml(content: str, profile: Profile, name: str, slave: int | None) -> ControllerList:
     root = fromstring(content, forbid_dtd=True)
     for element in root.iter():
-        # Some tools write a namespace, others none.
+        # Some programs write a namespace, others do not.
         element.tag = str(element.tag).rpartition("}")[2]
     if root.tag == "masters":
         return ControllerList("lcec", tuple(_lcec(root, profile, name, slave)))
@@ -161,7 +161,7 @@ def _xml(content: str, profile: Profile, name: str, slave: int | None) -> Contro
 
 
 def _slave_of_eni(root: Element, slave: int | None) -> Element:
-    """The slave that is meant; couplers and terminals without a mailbox are no drives."""
+    """The chosen slave; without a choice, slaves without a mailbox (couplers) do not count."""
     slaves = root.findall("./Config/Slave")
     if slave is None:
         slaves = [each for each in slaves if each.find("Mailbox") is not None] or slaves
@@ -178,7 +178,7 @@ def _init_commands(root: Element, profile: Profile, slave: int | None) -> Iterat
             continue
         ccs = command.findtext("Ccs")
         data = row_of_bytes(command.findtext("Data"), place)
-        # CiA 301: 1 is a download, 2 an upload; tools that count the other way give data with it.
+        # CiA 301: 1 is a download, 2 an upload; programs with the opposite coding still write data.
         if ccs is not None and number(ccs, place) != _CCS_DOWNLOAD and not data:
             continue
         transitions = [
@@ -197,8 +197,11 @@ def _init_commands(root: Element, profile: Profile, slave: int | None) -> Iterat
 def _parts(
     profile: Profile, index: int, first: int, data: bytes, transition: str, place: Text
 ) -> Iterator[Listed]:
-    """Subindexes of a complete access (ETG.1000.6 clause 5.6.2): from 0 or 1 on, subindex 0 filled
-    up to 16 bits, the others as long as their types and without a gap."""
+    """Single writes of a complete access (ETG.1000.6 clause 5.6.2).
+
+    It begins at subindex 0 or 1; subindex 0 is padded to 16 bits, the others have the length of
+    their types, without gaps.
+    """
     sizes = _sizes(profile, index)
     if first not in (0, 1) or not sizes:
         raise BadRow(
@@ -228,7 +231,7 @@ def _parts(
 
 
 def _sizes(profile: Profile, index: int) -> list[int | None]:
-    """Bytes of the entries from subindex 1 on; None where nobody says."""
+    """Sizes of the entries from subindex 1 on [bytes]; None where a size is not known."""
     for indexes, size in _PDO_LISTS:
         if index in indexes:
             return [size] * 254
@@ -243,7 +246,7 @@ def _lcec(root: Element, profile: Profile, name: str, slave: int | None) -> Iter
     within = chosen(root.findall("./master/slave"), slave)
     elsewhere = within.find("initCmds")
     if elsewhere is not None:
-        # A comparison that knows a part of the writes would call the rest unchanged.
+        # A comparison with only a part of the writes would report the rest as unchanged.
         file = (elsewhere.get("filename") or "").strip()[:80]
         raise BadSet("handover.list-in-another-file", name=name, file=file)
     written = [
@@ -272,7 +275,7 @@ def _lcec(root: Element, profile: Profile, name: str, slave: int | None) -> Iter
 
 
 def _dcf(data: bytes, profile: Profile, name: str) -> ControllerList:
-    """Values of a DCF, whose order is that of the objects and says nothing of the writing."""
+    """Values of a DCF, whose order is that of the objects and not that of writing."""
     report = ImportReport()
     writes = []
     for value in read_dcf_values(data, name, report):

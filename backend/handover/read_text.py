@@ -1,4 +1,4 @@
-"""Start-up lists that are text or bytes: CODESYS, CSV, shell scripts, ROS 2, concise DCF."""
+"""Reading start-up lists as text or bytes: CODESYS, CSV, shell scripts, ROS 2, concise DCF."""
 
 from __future__ import annotations
 
@@ -28,42 +28,43 @@ from profiles.schema import Profile
 
 _INTEGERS = {"int8": 1, "uint8": 1, "int16": 2, "uint16": 2, "int32": 4, "uint32": 4, "int64": 8,
              "uint64": 8}  # fmt: skip
-#: Numbers that `ethercat download` can make; it names sm8 to sm64 as well and refuses them.
+#: Types of integers that `ethercat download` accepts; it lists sm8 to sm64 as well but refuses
+#: them.
 _SIZE = _INTEGERS | {"bool": 1}
 _REAL = {"float": struct.Struct("<f"), "double": struct.Struct("<d")}
-#: The command of the IgH master, by its name, a path, or a variable that holds it.
+#: The command of the IgH master: its name, a path, or a variable that contains it.
 _COMMAND = re.compile(r"(?:\S*/)?ethercat|\$\{?\w+\}?", re.I)
-#: Words before a command that change nothing of what it writes.
+#: Words before a command that do not affect what it writes.
 _BEFORE = re.compile(r"do|then|else|if|while|until|!|\{|time|exec|sudo|nice|-\w+|\w+=\S*")
 _SHOWS = ("echo", "printf", "logger")
 _REDIRECTED = re.compile(r"\d?[<>]{1,2}\s*(?:&\d|[^\s;&|]+)")
-#: Options of `ethercat` that take a word, by their short and their long name.
+#: Options of `ethercat` that have an argument, by their short and long names.
 _WITH_WORD = {"t": "type", "p": "position", "a": "alias", "m": "master", "d": "domain"}
 _HEADINGS = {"codesys": "line", "csv": "key"}
 _ENTRY = struct.Struct("<HBI")
 _MOST_YAML_LEVELS = 20
-#: The command-line tool of the IgH master, by which a script writes.
+#: The command-line tool of the IgH master.
 _PROGRAM = "ethercat"
-#: Of a slave file with 20 000 writes, each a map of four fields.
+#: Largest number of YAML nodes: a slave file with 20 000 writes, each a map of four fields.
 _MOST_YAML_NODES = 200_000
-#: No line that writes one value is longer; `shlex` takes the square of a word's length.
+#: Longest line that is read; the time of `shlex` grows with the square of a word's length.
 _LONGEST_LINE = 2_000
-#: Twice the writes that are read; each takes time, and whether it writes is known only then.
+#: Largest number of lines to analyse: twice the permitted writes, as not every one is a write.
 _MOST_CANDIDATES = 40_000
 
 
 def is_script(content: str) -> bool:
-    """Whether a line of it writes by ``ethercat download``."""
+    """Whether a text is a script with at least one ``ethercat download``."""
     if _PROGRAM not in content:
         return False
     try:
         return any(_commands(line, place) for place, line in _candidates(content))
     except BadRow:
-        return True  # it writes in a form that is refused with its place
+        return True  # it writes in an unsupported form, which is refused later with its place
 
 
 def table_of(content: str) -> tuple[str, str] | None:
-    """Format and separator of a table by its first line; spreadsheets change the separator."""
+    """Format and separator of a table, from its first line; spreadsheets change the separator."""
     first = content.partition("\n")[0].strip()
     for separator in ";,\t":
         words = [word.strip().strip('"').lower() for word in first.split(separator)]
@@ -74,7 +75,7 @@ def table_of(content: str) -> tuple[str, str] | None:
 
 
 def codesys(content: str, separator: str) -> Iterator[Listed]:
-    """The columns of the tab Startup parameters."""
+    """Writes from a CODESYS table (columns of the page "Startup parameters")."""
     for line, row in enumerate(csv.DictReader(io.StringIO(content), delimiter=separator), 2):
         place = line_of(line)
         index, _, subindex = (row.get("Index:Subindex") or "").partition(":")
@@ -86,7 +87,7 @@ def codesys(content: str, separator: str) -> Iterator[Listed]:
 
 
 def csv_table(content: str, separator: str) -> Iterator[Listed]:
-    """The table that is exported here."""
+    """Writes from a CSV table as exported by servodeck."""
     for line, row in enumerate(csv.DictReader(io.StringIO(content), delimiter=separator), 2):
         place = line_of(line)
         yield listed(
@@ -100,7 +101,7 @@ def csv_table(content: str, separator: str) -> Iterator[Listed]:
 
 @dataclass(frozen=True, slots=True)
 class Download:
-    """One line of a script; ``slave`` is how it names the slave: master, alias and position."""
+    """One download of a script; ``slave``: master, alias and position as written there."""
 
     slave: tuple[str, str, str]
     write: Listed
@@ -109,7 +110,7 @@ class Download:
 def igh(script: str, profile: Profile) -> Iterator[Download]:
     """Every ``ethercat download`` of a script, in its order.
 
-    Without a type the command asks the slave for it; here the profile has it.
+    Without a type option the command reads the type from the slave; here it comes from the profile.
     """
     for place, line in _candidates(script):
         for words in _commands(line, place):
@@ -139,7 +140,7 @@ def _own_type(profile: Profile, index: int, subindex: int, place: Text) -> str:
 
 
 def _real(word: str, kind: str, place: Text) -> bytes:
-    # As a C++ stream reads it: without inf and nan.
+    # Like a C++ stream, which does not accept inf and nan.
     written = re.fullmatch(r"[+-]?(\d{1,40}\.?\d{0,40}|\.\d{1,40})(e[+-]?\d{1,3})?", word, re.I)
     try:
         if written is not None:
@@ -150,19 +151,19 @@ def _real(word: str, kind: str, place: Text) -> bytes:
 
 
 def _as_in_c(word: str, place: Text) -> int:
-    """A number as `ethercat` reads it: one that begins with 0 is octal."""
+    """A number as `ethercat` reads it: with a leading 0 it is octal."""
     octal = re.fullmatch(r"[+-]?0[0-7]+", word.strip())
     return int(word, 8) if octal else number(word, place)
 
 
 def _lines(content: str) -> list[str]:
-    """Lines of a shell script; one that ends with a backslash goes on in the next."""
+    """Lines of a shell script; a line that ends with a backslash continues in the next."""
     lines: list[str] = []
     parts: list[str] = []
     for line in content.splitlines():
         if line.endswith("\\"):
             parts.append(line[:-1])
-            lines.append("")  # keeps the numbers of the lines behind it
+            lines.append("")  # keeps the numbers of the following lines
         else:
             lines.append("".join([*parts, line]))
             parts = []
@@ -172,10 +173,10 @@ def _lines(content: str) -> list[str]:
 
 
 def _candidates(script: str) -> Iterator[tuple[Text, str]]:
-    """Lines of a shell script that may write, with their places.
+    """Lines of a shell script that may contain a download, with their places.
 
     Raises:
-        BadRow: a line is too long, or there are too many.
+        BadRow: a line is too long, or there are too many lines.
     """
     found = 0
     for at, line in enumerate(_lines(script), 1):
@@ -189,7 +190,7 @@ def _candidates(script: str) -> Iterator[tuple[Text, str]]:
 
 
 def _in_remark(before: str) -> bool:
-    """Whether what follows is behind a # that begins a remark, and not one in quotes."""
+    """Whether the text before contains a # that begins a comment, outside of quotes."""
     return any(
         not (before.count('"', 0, at) % 2 or before.count("'", 0, at) % 2)
         for at in (m.end() for m in re.finditer(r"(?:^|\s)(?=#)", before[:_LONGEST_LINE]))
@@ -197,10 +198,10 @@ def _in_remark(before: str) -> bool:
 
 
 def _commands(line: str, place: Text) -> list[list[str]]:
-    """Words behind ``ethercat`` of each download in a line.
+    """Words after ``ethercat`` of each download in a line.
 
     Raises:
-        BadRow: the line writes, and what it writes is not certain.
+        BadRow: the line writes, but what it writes is not certain.
     """
     plain = _REDIRECTED.sub(" ", line.replace("`", " ; "))
     words = shlex.shlex(plain, posix=True, punctuation_chars=";&|()")
@@ -221,7 +222,7 @@ def _commands(line: str, place: Text) -> list[list[str]]:
 
 
 def _download(command: list[str], place: Text) -> list[str]:
-    """Words behind ``ethercat`` where the command is a download, else none."""
+    """Words after ``ethercat`` where the command is a download; otherwise an empty list."""
     if command and command[0] in _SHOWS:
         return []
     for at, word in enumerate(command):
@@ -237,7 +238,7 @@ def _download(command: list[str], place: Text) -> list[str]:
 
 
 def _options(words: Sequence[str]) -> tuple[dict[str, str], list[str]]:
-    """Options by their long names, and the words that are no option."""
+    """Options by their long names, and the positional words."""
     given = iter(words)
     options: dict[str, str] = {}
     plain: list[str] = []
@@ -257,9 +258,9 @@ def _options(words: Sequence[str]) -> tuple[dict[str, str], list[str]]:
 
 
 def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
-    """A slave file of ethercat_driver_ros2, or a bus.yml of ros2_canopen."""
-    # Aliases make a small file as large as a bomb, and deep nesting takes a parser minutes. No
-    # slave file has either.
+    """Writes from a slave file of ethercat_driver_ros2, or from a bus.yml of ros2_canopen."""
+    # Aliases can expand a small file to an enormous one, and deep nesting takes a parser minutes.
+    # No slave file has either.
     depth = count = 0
     for event in yaml.parse(written, yaml.CSafeLoader):
         if isinstance(event, yaml.AliasEvent):
@@ -283,14 +284,14 @@ def ros2(written: str, profile: Profile, slave: int | None) -> Iterator[Listed]:
         index, subindex, value = (_whole(row, f, place) for f in ("index", "sub_index", "value"))
         kind = str(row.get("type") or _profile_type(profile, index, subindex))
         if kind not in _SIZE or (row.get("type") and kind not in _INTEGERS):
-            # ethercat_driver_ros2 writes what is no integer from memory that it has not set.
+            # For types other than integers, ethercat_driver_ros2 writes uninitialised memory.
             raise BadRow(text("handover.row-unknown-type", place=place, type=kind[:40]))
         data = sized(value, _SIZE[kind], place)
         yield listed(index, subindex, data, "PS", place)
 
 
 def _bus_nodes(content: dict[Any, Any]) -> list[Any]:
-    """Rows of each node of a bus.yml: under `nodes` with `defaults`, or each at the top."""
+    """SDO rows of each node of a bus.yml: under `nodes` with `defaults`, or at the top level."""
     named = content.get("nodes")
     if isinstance(named, list):
         named = {
@@ -305,7 +306,7 @@ def _bus_nodes(content: dict[Any, Any]) -> list[Any]:
 
 
 def _profile_type(profile: Profile, index: int, subindex: int) -> str:
-    """bus.yml gives no type: that of the object counts."""
+    """Type of an object from the profile, as bus.yml states none."""
     parameter = profile.by_key.get(f"{index:04X}:{subindex:02X}")
     if parameter is None:
         return "int32"
@@ -313,7 +314,7 @@ def _profile_type(profile: Profile, index: int, subindex: int) -> str:
 
 
 def _whole(row: dict[Any, Any], field: str, place: Text) -> int:
-    """A whole number; bus.yml files have them as text in quotes as well."""
+    """An integer; in bus.yml files it may also be a quoted string."""
     value = row.get(field)
     of_field = joined((place, field), ": ")
     if isinstance(value, str):
@@ -324,10 +325,10 @@ def _whole(row: dict[Any, Any], field: str, place: Text) -> int:
 
 
 def concise_dcf(data: bytes, most: int) -> tuple[Listed, ...] | None:
-    """The first ``most`` writes of 1F22h (CiA 302-2): a count, then index, subindex, size and data
-    of each.
+    """The first ``most`` writes of a concise DCF (1F22h, CiA 302-3).
 
-    None where the bytes are none: only a stream that ends with its last entry is one.
+    It has a count, then index, subindex, size and data of each write. None where the bytes are not
+    a concise DCF, which must end with its last entry.
     """
     if len(data) < 4:
         return None

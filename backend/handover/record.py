@@ -1,4 +1,4 @@
-"""What was handed over, drive by drive, kept over restarts for the report and for watching."""
+"""Log of hand-overs by drive, stored for the report and for later comparison."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _UNSAFE = re.compile(r"[^\w.\-]")
 
 @dataclass(frozen=True, slots=True)
 class HandedOver:
-    """One export: ``sha256`` is that of the list's file, ``values`` are raw by key."""
+    """One export. ``sha256``: of the list's file; ``values``: raw values by key."""
 
     time: datetime
     person: str
@@ -29,7 +29,7 @@ class HandedOver:
 
 
 class HandoverLog:
-    """One text file per drive, a JSON object a line, only ever appended to."""
+    """One text file per drive, with one JSON object a line; lines are only appended."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -38,10 +38,10 @@ class HandoverLog:
         return self.folder / f"{_UNSAFE.sub('_', drive_id)}.jsonl"
 
     def add(self, drive_id: str, made: HandedOver) -> None:
-        """Append.
+        """Append a hand-over.
 
         Raises:
-            StorageFailed: the disk.
+            StorageFailed: the file cannot be written.
         """
         row = asdict(made) | {"time": made.time.isoformat(), "values": dict(made.values)}
         try:
@@ -54,7 +54,7 @@ class HandoverLog:
             ) from error
 
     def read(self, drive_id: str) -> tuple[HandedOver, ...]:
-        """All hand-overs, oldest first. A line that a crash cut short is left out."""
+        """All hand-overs, oldest first. Incomplete lines, as after a crash, are left out."""
         try:
             lines = self._path(drive_id).read_text("utf-8").splitlines()
         except FileNotFoundError:

@@ -12,7 +12,7 @@ from backend.handover.text_lists import line_of, number_type
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 
-#: ethercat_driver_ros2 reads each value into a C++ `int` and casts it to the type that is named.
+#: ethercat_driver_ros2 reads each value into a C++ `int` and casts it to the stated type.
 _INT_LOW, _INT_HIGH = -(1 << 31), (1 << 31) - 1
 _ROLES = {
     "position_target": ("command_interface", "position"),
@@ -25,18 +25,18 @@ _ROLES = {
 
 
 def value_of(write: StartupWrite) -> int | None:
-    """The number in a file of ROS 2 that makes the write's bytes; None where there is none."""
+    """The number in a ROS 2 file that results in the write's bytes; None where there is none."""
     size = len(write.data)
     number = int.from_bytes(write.data, "little", signed=True)
     unsigned = write.number
     if unsigned <= _INT_HIGH:
         return unsigned if write.type.startswith(("U", "B", "R")) else number
-    # -1 as uint32 is FFFFFFFFh: what is cast from the signed number of as many bytes is the same.
+    # -1 cast to uint32 is FFFFFFFFh: the signed number of the same size results in the same bytes.
     return number if size in (1, 2, 4, 8) and _INT_LOW <= number <= _INT_HIGH else None
 
 
 def carried(axis: AxisHandover) -> AxisHandover:
-    """The axis with the writes that ROS 2's files can carry; the others are left out.
+    """The axis with the writes that ROS 2's files can express; the others are left out.
 
     Raises:
         NotAllowed: nothing is left to write.
@@ -89,7 +89,7 @@ def ros2(axis: AxisHandover) -> bytes:
 
 
 def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
-    # It has no real number in process data: such an entry keeps its place without an interface.
+    # The driver has no floating-point process data: such an entry is a gap without an interface.
     gap = entry.type is None or entry.type == "REAL32"
     kind = f"bit{entry.bits}" if gap or entry.type is None else entry.type.lower()
     kind = "bool" if entry.type == "BOOL" else kind
@@ -107,10 +107,10 @@ def _channel(axis: AxisHandover, entry: MappedEntry) -> str:
 
 
 def increments_per_radian(axis: AxisHandover) -> float | None:
-    """Position increments per radian of the motor, None where it is not certain.
+    """Position increments per radian of the motor; None where they are not certain.
 
-    Certain only where the list itself sets the whole gearing to its defaults: a wrong factor
-    scales every motion of the controller.
+    They are certain only where the list itself sets the whole gearing to its defaults, as a wrong
+    factor would scale every motion of the controller.
     """
     units = axis.profile.units
     gearing = {units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions}
@@ -123,7 +123,7 @@ def increments_per_radian(axis: AxisHandover) -> float | None:
 
 
 def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
-    """`bus.yml` of ros2_canopen, which names the DCFs next to it; node numbers are proposed."""
+    """`bus.yml` of ros2_canopen, which refers to the DCFs next to it; node-IDs are proposed."""
     cycle_us = max(axis.cycle_us for axis in axes)
     lines = [
         "options:",
@@ -154,7 +154,7 @@ def bus_yml(axes: Sequence[AxisHandover], dcf_names: Sequence[str]) -> bytes:
 
 
 def ros2_control(axes: Sequence[AxisHandover], slave_files: Sequence[str]) -> bytes:
-    """`ros2_control` of ethercat_driver_ros2 that names the slave files next to it."""
+    """`ros2_control` of ethercat_driver_ros2, which refers to the slave files next to it."""
     frequency = 1_000_000 // max(axis.cycle_us for axis in axes)
     lines = [
         '<ros2_control name="segment" type="system">',

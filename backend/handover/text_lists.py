@@ -21,33 +21,33 @@ CSV_COLUMNS = (
     "key", "index", "subindex", "type", "bytes", "raw", "data", "transition", "value", "unit",
     "name",
 )  # fmt: skip
-#: Neither ethercat_driver_ros2 nor all versions of `ethercat download` take a REAL32: its four
-#: bytes are handed over as a number, which is the same on the wire.
+#: Neither ethercat_driver_ros2 nor all versions of `ethercat download` accept a REAL32: its four
+#: bytes are handed over as an integer, which results in the same bytes.
 _AS_NUMBER = {"REAL32": "uint32", "BOOL": "uint8"}
 
 
 def number_type(write: StartupWrite) -> str:
-    """Type word of `ethercat download` and ethercat_driver_ros2."""
+    """Name of the type for `ethercat download` and ethercat_driver_ros2."""
     return _AS_NUMBER.get(write.type, write.type.lower())
 
 
 def number_of(write: StartupWrite) -> int:
-    """Value as a whole number of `number_type`."""
+    """Value as an integer of `number_type`."""
     return write.number if write.type in _AS_NUMBER else int(write.raw)
 
 
 def line_of(text: str) -> str:
-    """One line of it without control characters: no value of a file may begin a line of its own."""
+    """A text as one line without control characters, so that it cannot add lines to a file."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def _cell(text: str) -> str:
-    """A cell of one line that no spreadsheet takes for a formula."""
+    """A cell of one line that a spreadsheet does not interpret as a formula."""
     return as_text(line_of(text))
 
 
 def codesys(axis: AxisHandover) -> bytes:
-    """Rows for CODESYS's start-up parameters; values as IEC 61131-3 hexadecimal of the bits."""
+    """Rows for CODESYS's start-up parameters; values as IEC 61131-3 hexadecimal numbers."""
     text = io.StringIO()
     table = csv.writer(text, delimiter=";", lineterminator="\r\n")
     table.writerow(CODESYS_COLUMNS)
@@ -62,7 +62,7 @@ def codesys(axis: AxisHandover) -> bytes:
 
 
 def csv_table(axis: AxisHandover) -> bytes:
-    """A table for people; ``data`` are the bytes in the order of travel."""
+    """A table for people; ``data``: the bytes in the order of transmission."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\r\n")
     table.writerow(CSV_COLUMNS)
@@ -77,7 +77,7 @@ def csv_table(axis: AxisHandover) -> bytes:
 
 
 def igh(axis: AxisHandover) -> bytes:
-    """Shell script of `ethercat download`; it ends at the first write that fails."""
+    """Shell script of `ethercat download` commands; it ends at the first write that fails."""
     lines = [
         "#!/bin/sh",
         f"# Start-up values of {line_of(axis.name)}, to be written in Pre-Operational.",
@@ -100,7 +100,7 @@ def igh(axis: AxisHandover) -> bytes:
 def dcf(
     axis: AxisHandover, file_name: str, saved: datetime | None, *, reals_as_bits: bool = False
 ) -> bytes:
-    """Device configuration file of CiA 306-1; dated as the set, so that it comes out the same."""
+    """Device configuration file (CiA 306-1), dated as the set, so that output is reproducible."""
     values = {write.key: write.raw for write in axis.writes}
     created = saved or datetime(2000, 1, 1, tzinfo=UTC)
     known = axis.profile.identity
@@ -130,7 +130,7 @@ def concise_dcf(axis: AxisHandover) -> bytes:
 
 
 def python(axis: AxisHandover) -> bytes:
-    """Script that writes over the command line's server and reads each value back."""
+    """Python script that writes by a running server and reads each value back."""
     rows = "\n".join(f"    ({w.key!r}, {w.raw!r}),  # {line_of(w.name)}" for w in axis.writes)
     return f'''"""Write the values of a hand-over to a drive of a running servodeck and verify them.
 
@@ -188,9 +188,9 @@ _SHEET = (
 
 
 def sheet(axis: AxisHandover) -> bytes:
-    """Scaling of the controller's axis, what was left out, and what must be heeded.
+    """Sheet with the scaling of the controller's axis, values left out, and notes.
 
-    Only what the list itself writes is stated as a value: what it leaves is as the drive keeps it.
+    Only parameters that the list writes have a value here; others keep their values in the drive.
     """
     units = axis.profile.units
     lines = [f"Hand-over of {line_of(axis.name)} ({axis.profile.title})", "", "Scaling"]
@@ -239,7 +239,7 @@ def _with_unit(parameter: Parameter, raw: Raw) -> str:
 
 
 def _increments_per_unit(axis: AxisHandover) -> str:
-    """Encoder increments per unit of the drive's positions, from the gearing that is handed over.
+    """Encoder increments per position unit of the drive, from the gearing that is handed over.
 
     CiA 402-2 clause 9: the gear ratio is motor revolutions per shaft revolution (6091h), the feed
     is units per shaft revolution (6092h).

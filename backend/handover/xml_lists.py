@@ -10,12 +10,12 @@ from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
 
 #: Download request of CoE (ETG.2100 table of InitCmd: Ccs 1 is an SDO download).
 _CCS_DOWNLOAD = 1
-#: Words of a `lcec` HAL type by width and sign; `lcec` has no 64-bit pin.
+#: Types with a signed HAL pin in `lcec`, which has no 64-bit pins.
 _SIGNED = ("INT8", "INT16", "INT32")
 
 
 def child(parent: Element, tag: str, text: object = None, **attributes: str) -> Element:
-    """Add an element; XML 1.0 has no control characters, so they are left out."""
+    """Add an element; control characters, not permitted in XML 1.0, become spaces."""
     element = SubElement(parent, tag, attributes)
     if text is not None:
         element.text = "".join(c if c.isprintable() else " " for c in str(text))
@@ -23,20 +23,20 @@ def child(parent: Element, tag: str, text: object = None, **attributes: str) -> 
 
 
 def file_of(root: Element[str]) -> bytes:
-    """The file of a tree."""
+    """An element tree as a file."""
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text + b"\n"
 
 
 def note(text: str) -> Element[Any]:
-    """A comment; two hyphens would end it."""
+    """A comment; two hyphens, which are not permitted in it, are separated."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return Comment(f" {plain.replace('--', '- -')} ")
 
 
 def init_commands(parent: Element, writes: tuple[StartupWrite, ...]) -> Element:
-    """`InitCmds` as ETG.2000 (ESI) and ETG.2100 (ENI) share them."""
+    """`InitCmds`, which ETG.2000 (ESI) and ETG.2100 (ENI) have in common."""
     commands = child(parent, "InitCmds")
     for write in writes:
         init_command(commands, write)
@@ -44,7 +44,7 @@ def init_commands(parent: Element, writes: tuple[StartupWrite, ...]) -> Element:
 
 
 def init_command(commands: Element, write: StartupWrite) -> None:
-    """One download; Data is hexadecimal in the order of travel."""
+    """One download; Data is hexadecimal in the order of transmission."""
     command = child(commands, "InitCmd")
     child(command, "Transition", write.transition)
     child(command, "Comment", write.name)
@@ -63,8 +63,9 @@ def twincat(axis: AxisHandover) -> bytes:
 
 
 def lcec(axes: Sequence[AxisHandover]) -> bytes:
-    """`masters` of linuxcnc-ethercat, each drive a slave of type generic in the order of the cable;
-    numbers are hexadecimal where its documentation has them so.
+    """`masters` of linuxcnc-ethercat, with each drive as a slave of type generic, in cable order.
+
+    Numbers are hexadecimal where its documentation has them so.
 
     Raises:
         NotAllowed: identity unknown.
@@ -112,7 +113,7 @@ def _lcec_slave(master: Element, axis: AxisHandover, number: int, name: str) -> 
 def _lcec_entry(pdo: Element, entry: MappedEntry) -> None:
     place = {"idx": f"{entry.index:04X}", "subIdx": f"{entry.subindex:02X}"}
     if entry.type is None or entry.bits > 32:
-        # A gap that `lcec` maps without a pin; it has no pin of 64 bits.
+        # `lcec` maps a gap without a pin; for more than 32 bits it has no pin.
         child(pdo, "pdoEntry", **place, bitLen=str(entry.bits))
         return
     kind = "s32" if entry.type in _SIGNED else "u32"
@@ -122,14 +123,14 @@ def _lcec_entry(pdo: Element, entry: MappedEntry) -> None:
 
 
 def hal_pin(entry: MappedEntry) -> str:
-    """Name of a HAL pin: unique by its object, readable by its name."""
+    """Name of a HAL pin: the readable name, made unique by the object's address."""
     word = "".join(c if c.isascii() and c.isalnum() else "-" for c in entry.name.lower())
     word = "-".join(part for part in word.split("-") if part)[:20].strip("-")
     return f"{word}-{entry.index:04x}-{entry.subindex:02x}"
 
 
 def hal_stub(axes: Sequence[AxisHandover], file_name: str) -> bytes:
-    """HAL file that loads the list; its pins are to be connected by hand."""
+    """HAL file that loads the list; its pins must be connected by hand."""
     names = ", ".join(" ".join(axis.name.split()) for axis in axes)
     lines = [
         f"# Start of EtherCAT for {names}; connect the pins to your axes.",

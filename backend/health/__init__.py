@@ -1,1 +1,1 @@
-"""The condition of axes over years: signed baselines, health checks, their comparison and trend."""
+"""Condition of axes over years: signed baselines, health checks, comparison and trend."""

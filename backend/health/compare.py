@@ -1,18 +1,19 @@
-"""Whether an axis has changed against its baseline, with at most one false alarm in a hundred.
+"""Comparison of an axis with its baseline, with at most one false alarm in a hundred comparisons.
 
-Values are compared as logarithms, so that a change is a share. A change is reported where all of
-this holds:
+Values are compared as logarithms, so that a change is relative. A change is reported where all of
+these conditions hold:
 
 * Student's t for the difference of two means (baseline, newest checks; pooled variance of the
   repeats) excludes zero. The level is 1 % for all judged quantities of an axis together
   (Bonferroni), so that many quantities do not add up to alarms.
-* The variance is that between repeats, or that of the results' own 95 % intervals where it is
-  larger: three repeats that agree by chance count for no more than each of them is known.
-* The mean differs by at least half of the change that is looked for (5 % of a resonance, 20 % of
-  friction or inertia), and so does each single check, in the same direction: one bad measurement
-  is no change, nor is a drift that nobody has to act on.
+* The variance is that between repeats, or that of the results' own 95 % intervals where that is
+  larger: three repeats that agree by chance are not more certain than each single result.
+* The mean differs by at least half of the change to be detected (5 % of a resonance, 20 % of
+  friction or inertia), and so does each single check, in the same direction. This excludes one bad
+  measurement and a drift too small to act on.
 
-One check alone is at most *suspected*; fewer than three repeats in the baseline decide nothing.
+With one check a change is at most *suspected*; a baseline of fewer than three repeats gives no
+result.
 """
 
 from __future__ import annotations
@@ -29,30 +30,30 @@ from backend.tools.health.result import HealthRound, HealthValue, Quantity
 
 Code = Literal["changed", "suspected", "same", "undecided", "not_seen", "few_runs", "no_check"]
 Direction = Literal["", "higher", "lower"]
-#: False alarms of one comparison of an axis, all quantities together.
+#: Probability of a false alarm in one comparison of an axis, for all quantities together.
 FALSE_ALARMS = 0.01
-#: The share that must be found, by quantity. Others are shown, not judged.
+#: Relative change that must be detected, by quantity. Other quantities are shown but not judged.
 LOOKED_FOR: dict[Quantity, float] = {"resonance": 0.05, "friction": 0.20, "inertia": 0.20}
-#: Fewer repeats show too little of the spread.
+#: Smallest number of repeats; with fewer the spread is not known well enough.
 LEAST_REPEATS = 3
-#: The newest checks that are compared.
+#: Number of newest checks that are compared.
 CHECKS = 2
-#: Resonances that are judged; the others are shown.
+#: Number of resonances that are judged; further ones are shown only.
 _JUDGED = 2
-#: A resonance further away than this factor is another one.
+#: A resonance that differs by more than this factor is a different one.
 _ANOTHER = 1.5
-#: Nothing is known better than this share, however well repeats agree.
+#: Smallest relative standard deviation that is assumed, however well repeats agree.
 _FINEST = 1e-3
 _Z95 = 1.959964
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One quantity against its baseline.
+    """One quantity compared with its baseline.
 
-    ``change`` and its interval ``low`` to ``high`` are shares (0.1 is 10 % more), None where
-    nothing can be compared. ``before`` and ``now`` are geometric means, in the quantity's unit.
-    ``looked_for`` is None where the quantity is not judged.
+    ``change`` and its interval ``low`` to ``high`` are relative (0.1 is 10 % more), None where
+    nothing can be compared. ``before`` and ``now``: geometric means, in the quantity's unit.
+    ``looked_for``: relative change to be detected, None where the quantity is not judged.
     """
 
     quantity: Quantity
@@ -71,11 +72,11 @@ class Finding:
 class _Sample:
     log: float
     deviation: float
-    """Standard deviation by its own interval; 0 where none is known."""
+    """Standard deviation of ``log`` from its own 95 % interval; 0 where that is not known."""
 
 
 def compare(baseline: Sequence[HealthRound], checks: Sequence[HealthRound]) -> list[Finding]:
-    """Every quantity of the baseline; of ``checks`` (oldest first) the newest two count."""
+    """Compare every quantity of the baseline with the newest two ``checks`` (oldest first)."""
     newest = checks[-CHECKS:]
     pairs = [
         (quantity, number, *_matched(baseline, newest, quantity, number))
@@ -105,9 +106,10 @@ def _names(baseline: Sequence[HealthRound]) -> list[tuple[Quantity, int]]:
 def _matched(
     baseline: Sequence[HealthRound], checks: Sequence[HealthRound], quantity: Quantity, number: int
 ) -> tuple[list[_Sample], list[_Sample]]:
-    """Samples of one quantity on both sides; a resonance is the nearest one, not the same number.
+    """Samples of one quantity in baseline and checks.
 
-    One that is missing in a round would else shift all above it.
+    Resonances are matched by the nearest frequency and not by number, as one that is missing in a
+    round would shift the numbers of all above it.
     """
     own = [
         each
@@ -171,7 +173,7 @@ def _finding(
 
 
 def _code(low: float, high: float, shifts: list[float], looked_for: float) -> Code:
-    """What the interval of the change says, and each check's own change."""
+    """Verdict from the interval of the change, and from each check's own change."""
     least = math.log1p(looked_for / 2)
     up, down = all(each >= least for each in shifts), all(each <= -least for each in shifts)
     if (up and low > 0) or (down and high < 0):

@@ -1,7 +1,8 @@
-"""The standing permission of a person that the health check of an axis runs without them.
+"""A person's standing permission to run the health check of an axis unattended.
 
-It lies in the station's own folder, also where the database is shared: nobody who can write to that
-server gets to move axes here. It names a baseline, whose settings are all that it permits.
+It is stored in the station's own folder, also where the database is shared, so that nobody with
+write access to that server can move axes here. It refers to a baseline, and permits that baseline's
+settings only.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from backend.store.files import write_atomically
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
 
-#: No permission is given for longer.
+#: Longest term of a permission.
 LONGEST = timedelta(days=366)
-#: A run that is due is made within this time, or it is missed: nobody expects motion later.
+#: A due run begins within this time or counts as missed, as nobody expects motion later.
 WINDOW = timedelta(minutes=10)
-#: Attempts that are kept of a permission.
+#: Number of attempts that are stored with a permission.
 KEPT = 50
 
 Cause = Literal["schedule", "trigger"]
@@ -35,7 +36,7 @@ class _Part(BaseModel):
 
 
 class Attempt(_Part):
-    """One run that was due or asked for, and what became of it; ``why`` is a message on the wire.
+    """One run that was due or requested, and its outcome; ``why``: a message in wire form.
 
     ``not_made``: nothing moved. ``missed``: servodeck did not run at the time.
     """
@@ -47,12 +48,12 @@ class Attempt(_Part):
 
 
 class Permission(_Part):
-    """Who permits what, until when.
+    """A permission: person, axis, term, schedule and trigger.
 
-    ``account`` is the number of the person's account, None on a station without accounts. The run
-    is due on ``days`` (0 is Monday) at ``at`` of the station's clock; without days there is no
-    schedule. ``trigger``: a controller may ask for a run. ``pause_s`` lies between two runs.
-    ``handled`` is the newest due time that has been dealt with, ``begun`` when the newest run did.
+    ``account``: number of the person's account, None on a station without accounts. A run is due on
+    ``days`` (0 is Monday) at ``at`` by the station's clock; without days there is no schedule.
+    ``trigger``: a controller may request a run. ``pause_s``: shortest time between two runs.
+    ``handled``: newest due time that has been processed. ``begun``: time of the newest run.
     """
 
     id: str = Field(default_factory=lambda: secrets.token_hex(8))
@@ -73,11 +74,11 @@ class Permission(_Part):
 
     @property
     def session(self) -> str:
-        """What grants of its runs are asked for by, so that they end with it."""
+        """Session under which grants of its runs are requested, so that they end with it."""
         return f"health-permission-{self.id}"
 
     def noted(self, attempt: Attempt) -> Permission:
-        """With one more attempt; its end takes the place of its beginning."""
+        """The permission with one more attempt; the end of a run replaces its beginning."""
         kept = tuple(
             each for each in self.attempts if (each.outcome, each.at) != ("running", attempt.at)
         )
@@ -86,10 +87,10 @@ class Permission(_Part):
 
 
 def due(permission: Permission, now: datetime) -> datetime | None:
-    """The newest time at or before ``now`` that is due and not dealt with, in UTC.
+    """The newest due time at or before ``now`` that is not processed yet, in UTC; None without one.
 
-    A day of the clock that has no such time (summer time begins) has none; one that has it twice
-    has the first.
+    A day without this local time (beginning of summer time) has none; a day on which it occurs
+    twice has the first.
     """
     local = now.astimezone()
     for back in range(8):
@@ -105,7 +106,7 @@ def due(permission: Permission, now: datetime) -> datetime | None:
 
 
 def next_due(permission: Permission, now: datetime) -> datetime | None:
-    """The next time after ``now``, in UTC; None without a schedule or after its end."""
+    """The next due time after ``now``, in UTC; None without a schedule or after its end."""
     local = now.astimezone()
     for ahead in range(9):
         day = local.date() + timedelta(days=ahead)
@@ -116,10 +117,10 @@ def next_due(permission: Permission, now: datetime) -> datetime | None:
 
 
 def require_term(given: datetime, until: datetime) -> None:
-    """A permission ends after it begins, and within a year.
+    """Check that a permission ends after it begins, and within `LONGEST`.
 
     Raises:
-        NotAllowed: otherwise.
+        NotAllowed: it does not.
     """
     if not given < until <= given + LONGEST:
         raise NotAllowed(
@@ -130,7 +131,7 @@ def require_term(given: datetime, until: datetime) -> None:
 
 
 def why_of(error: DriveError) -> dict[str, object]:
-    """What was in the way, as it is stored and sent."""
+    """The text of an error in wire form, as it is stored and sent."""
     found: Text = error.text
     return found.to_wire()
 
@@ -140,14 +141,14 @@ class _Kept(_Part):
 
 
 class Permissions:
-    """The permissions of a station, at most one for each drive, over restarts."""
+    """The permissions of a station, at most one for each drive, stored across restarts."""
 
     def __init__(self, file: Path) -> None:
         self._file = file
         self._known: dict[str, Permission] = {}
 
     def load(self) -> None:
-        """Read what was kept. Runs that a crash or a power cut ended are marked as failed.
+        """Read the stored permissions; runs ended by a crash or a power cut are marked as failed.
 
         A file that cannot be read permits nothing.
         """
@@ -163,27 +164,27 @@ class Permissions:
             self._known[each.drive] = found
 
     def all(self) -> list[Permission]:
-        """In the order in which they were given."""
+        """All permissions, in the order in which they were given."""
         return list(self._known.values())
 
     def of(self, drive: str) -> Permission | None:
-        """That of a drive."""
+        """The permission of a drive; None without one."""
         return self._known.get(drive)
 
     def put(self, permission: Permission) -> Permission:
-        """Keep it, in place of another one of the drive. Blocks for a write.
+        """Store a permission, in place of another one of the drive. Blocks for a write.
 
         Raises:
-            StorageFailed: it cannot be written, and what was there before counts.
+            StorageFailed: it cannot be written; the earlier one stays in force.
         """
         self._store({**self._known, permission.drive: permission})
         return permission
 
     def take_back(self, drive: str) -> Permission | None:
-        """The drive has none any more; that which it had. It counts no longer in any case.
+        """Remove the permission of a drive and return it. It is withdrawn in any case.
 
         Raises:
-            StorageFailed: it would be there again after a restart.
+            StorageFailed: the removal cannot be stored; the permission returns after a restart.
         """
         gone = self._known.pop(drive, None)
         if gone is not None:
@@ -191,7 +192,7 @@ class Permissions:
         return gone
 
     def change(self, permission: Permission, how: Callable[[Permission], Permission]) -> None:
-        """Change it where it still is the one of its drive.
+        """Change a permission, provided that it still is the one of its drive.
 
         Raises:
             StorageFailed: as `put`.
@@ -201,7 +202,7 @@ class Permissions:
             self.put(how(now))
 
     def skip(self, permission: Permission) -> None:
-        """Like `put`, until the next start: for when nothing can be written."""
+        """Like `put`, but until the next start only, for when nothing can be written."""
         self._known[permission.drive] = permission
 
     def _store(self, known: dict[str, Permission]) -> None:

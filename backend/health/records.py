@@ -1,4 +1,4 @@
-"""Rounds of health checks and signed baselines in the database, and what is read from them."""
+"""Rounds of health checks and signed baselines in the database."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from backend.tools.health.result import HealthRound
 from backend.tools.health.settings import HealthSettings
 from drivers.errors import NotAllowed
 
-#: Settings that change no value: how often is measured, and what a person agreed to.
+#: Settings that do not affect the values: the number of rounds, and the consent of a person.
 _OF_NO_EFFECT = frozenset({"rounds", "consent"})
 
 
 @dataclass(frozen=True)
 class AxisOf:
-    """Which axis: its key (see `backend.store.health_tables`) and what its drive reported."""
+    """Identity of an axis: its key (see `backend.store.health_tables`), and data of its drive."""
 
     key: str
     name: str
@@ -39,7 +39,7 @@ class AxisOf:
 
 @dataclass(frozen=True)
 class HealthRow:
-    """One round as it is stored; ``measurements`` are names of raw data with their SHA-256."""
+    """One round as stored; ``measurements``: names of raw data with their SHA-256."""
 
     id: int
     axis: AxisOf
@@ -53,7 +53,7 @@ class HealthRow:
 
 @dataclass(frozen=True)
 class Baseline:
-    """A signed baseline. ``intact``: its contents still have the checksum of the signing."""
+    """A signed baseline. ``intact``: its contents still have the checksum from signing."""
 
     id: int
     axis: AxisOf
@@ -72,10 +72,10 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Condition:
-    """One axis: its rounds, oldest first, and its newest against the baseline.
+    """Condition of one axis: its rounds, oldest first, and the newest compared with the baseline.
 
-    ``findings`` are empty without an intact baseline. ``other_settings`` counts rounds after the
-    baseline that were measured otherwise and are not compared.
+    ``findings`` are empty without an intact baseline. ``other_settings``: number of rounds after
+    the baseline that were measured with other settings and are not compared.
     """
 
     axis: AxisOf
@@ -104,7 +104,7 @@ def axis_of(drive: Drive, station: str) -> AxisOf:
 
 
 def settings_sha256(settings: HealthSettings) -> str:
-    """Of the settings on which values depend."""
+    """Checksum of the settings on which values depend."""
     reported = settings.model_dump(mode="json", exclude=set(_OF_NO_EFFECT))
     return _digest(reported)
 
@@ -125,7 +125,7 @@ class HealthRecords:
         person: str,
         taken: datetime | None = None,
     ) -> list[int]:
-        """Store the rounds of one health check; their ids.
+        """Store the rounds of one health check; return their ids.
 
         Raises:
             DatabaseFailed: nothing was stored.
@@ -148,10 +148,10 @@ class HealthRecords:
             return [row.id for row in rows]
 
     def sign(self, key: str, runs: Collection[int], person: str, notes: str = "") -> Baseline:
-        """Sign rounds of an axis as its baseline, in place of the one before, which is kept.
+        """Sign rounds of an axis as its baseline; an earlier baseline stays stored.
 
         Raises:
-            NotAllowed: too few, not of this axis, of different settings, or nobody signs.
+            NotAllowed: too few rounds, not of this axis, with different settings, or no person.
         """
         if not person.strip():
             raise NotAllowed("health.baseline-needs-name", parameter="person")
@@ -192,15 +192,16 @@ class HealthRecords:
             return _baseline(made)
 
     def condition(self, axis: AxisOf) -> Condition:
-        """One axis and its comparison."""
+        """Condition of one axis."""
         with self._store.reading() as session:
             rows = _rows(session, _query().where(HealthRun.axis_key == axis.key))
             baselines = _baselines(session, axis.key)
         return _condition(axis, rows, baselines.get(axis.key))
 
     def trend(self, since: datetime | None = None, name: str = "") -> list[Condition]:
-        """All axes of the database, or those of a name; by name. ``since`` leaves out rounds that
-        are older from what is shown, not from the comparison.
+        """Conditions of all axes of the database, or of those with a name; sorted by name.
+
+        ``since`` limits the rounds that are returned, not those that are compared.
         """
         query = _query()
         if name:
@@ -237,7 +238,7 @@ def _query() -> Select[HealthRun]:
 
 
 def _rows(session: Session, query: Select[HealthRun]) -> list[HealthRow]:
-    """Rows of a query. Columns, not objects of the mapping: thousands are read for one page."""
+    """Rows of a query; read as columns and not as mapped objects, as a page needs thousands."""
     columns = [each for each in HealthRun.__table__.columns if each.name != "settings"]
     found = session.execute(query.with_only_columns(*columns))
     return [
@@ -256,7 +257,7 @@ def _rows(session: Session, query: Select[HealthRun]) -> list[HealthRow]:
 
 
 def _baselines(session: Session, key: str | None = None) -> dict[str, Baseline]:
-    """The newest of each axis."""
+    """The newest baseline of each axis."""
     newest = select(func.max(HealthBaseline.id)).group_by(HealthBaseline.axis_key)
     if key is not None:
         newest = newest.where(HealthBaseline.axis_key == key)
@@ -271,7 +272,7 @@ def _content(
     person: str,
     notes: str,
 ) -> dict[str, object]:
-    """What is signed: who, when, which axis, which stored measurements, and their values."""
+    """Signed contents: person, time, axis, stored measurements and their values."""
     return {
         "signed": signed.isoformat(),
         "person": person,

@@ -1,4 +1,4 @@
-"""The words of a finding and its next step, as messages of the catalogue."""
+"""Texts of a finding and of its next step, as messages of the catalogue."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SHOWN = "health.shown-only"
 
 
 def name_of(finding: Finding) -> Text:
-    """What the quantity is called, such as *resonance 1*."""
+    """Name of the quantity, such as *resonance 1*."""
     name = _QUANTITIES[finding.quantity]
     if finding.quantity not in ("resonance", "antiresonance"):
         return name
@@ -42,7 +42,7 @@ def name_of(finding: Finding) -> Text:
 
 
 def message_of(finding: Finding) -> Text:
-    """What was found; its `remedy` is the next step."""
+    """Message of a finding; its `remedy` is the next step."""
     code = _OTHERS.get(finding.code, "")
     if finding.code == "changed":
         code = _CHANGED[finding.quantity, finding.direction]
@@ -55,7 +55,7 @@ def message_of(finding: Finding) -> Text:
         change_percent=100.0 * change,
         low_percent=100.0 * (finding.low or 0.0),
         high_percent=100.0 * (finding.high or 0.0),
-        # A resonance of one spring goes with the root of its stiffness.
+        # The frequency of a resonance is proportional to the square root of the stiffness.
         stiffness_percent=100.0 * ((1.0 + change) ** 2 - 1.0),
         looked_for_percent=100.0 * (finding.looked_for or 0.0),
     )

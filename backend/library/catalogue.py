@@ -1,7 +1,7 @@
 """The library in the database: named entries with versions that are never changed.
 
-Everything here blocks and belongs on a thread (`Store.call`). Contents up to `INLINE` bytes lie in
-the database, so that they and their row appear together; larger ones are blobs.
+All functions block and must run on a thread (`Store.call`). Contents up to `INLINE` bytes are in
+the database, so that they are stored together with their row; larger ones are blobs.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from drivers.texts import limits
 from drivers.texts.message import text
 
 INLINE = 1_000_000
-#: Longer than any storing takes.
+#: Age of unused blobs before they are deleted: longer than storing an entry takes.
 _BLOB_AGE = timedelta(days=1)
-#: Held on PostgreSQL by everybody who stores contents, against deleting unused ones meanwhile.
+#: PostgreSQL lock held while contents are stored, so that unused ones are not deleted meanwhile.
 _CONTENTS_LOCK = 0x5E2D0DED
 
 
@@ -49,7 +49,7 @@ class NotInLibrary(NotAllowed):
 
 
 class Library:
-    """The library of a store. ``record`` is informed of every change (see backend.audit)."""
+    """The library of a store. ``record`` is called with every change (see backend.audit)."""
 
     def __init__(
         self,
@@ -64,10 +64,10 @@ class Library:
     # --- finding ----------------------------------------------------------------------
 
     def search(self, query: Query) -> tuple[list[Entry], int]:
-        """A page of entries, newest first, and how many there are in all.
+        """A page of entries, newest first, and their total number.
 
         Raises:
-            DatabaseFailed: the database.
+            DatabaseFailed: an error of the database.
         """
         wanted = rows.matching(query)
         with self.store.reading(snapshot=True) as session:
@@ -107,7 +107,7 @@ class Library:
             return [rows.version(row) for row in reversed(self._item(session, entry_id).versions)]
 
     def tags(self) -> dict[str, int]:
-        """Tags in use and how many entries have each."""
+        """Tags in use, each with its number of entries."""
         count = select(Tag.tag, func.count()).join(Item).where(Item.deleted.is_(None))
         with self.store.reading() as session:
             found = session.execute(count.group_by(Tag.tag).order_by(Tag.tag))
@@ -117,7 +117,7 @@ class Library:
         """Contents of a version, the latest by default, compared with their SHA-256.
 
         Raises:
-            NotInLibrary: no such entry or version, or its file lies on another station.
+            NotInLibrary: no such entry or version, or its file is on another station.
             BlobFailed: missing or damaged.
         """
         with self.store.reading() as session:
@@ -140,9 +140,11 @@ class Library:
     # --- changing ---------------------------------------------------------------------
 
     def add(self, kind: Kind, name: str, data: bytes, addition: Addition) -> Entry:
-        """Store a new version: of the entry of this name, or of a new one.
+        """Store a new version of the entry of this name, or a new entry.
 
-        What equals the latest version makes no new one. A deleted entry of this name comes back.
+        Contents that equal the latest version make no new one. A deleted entry of this name is
+        restored.
+
 
         Raises:
             StorageFailed: nothing was stored.
@@ -154,7 +156,7 @@ class Library:
         except DatabaseFailed as error:
             if not isinstance(error.__cause__, IntegrityError):
                 raise
-            # Another station made the same name, or stored the same contents, at this moment.
+            # Another station used the same name, or stored the same contents, at the same time.
             entry, fresh = self._add(kind, name, data, addition)
         if fresh:
             self._record_action("saved", entry, bytes=len(data))
@@ -190,7 +192,7 @@ class Library:
     def annotate(
         self, entry_id: int, *, notes: str | None = None, tags: tuple[str, ...] | None = None
     ) -> Entry:
-        """Change notes or tags; None leaves them.
+        """Change notes or tags; None leaves them unchanged.
 
         Raises:
             NotInLibrary: no such entry. NotAllowed: too long or too many.
@@ -213,7 +215,7 @@ class Library:
         return entry
 
     def delete(self, entry_id: int) -> Entry:
-        """Put an entry aside; its versions stay until `purge`.
+        """Archive an entry; its versions stay until `purge`.
 
         Raises:
             NotInLibrary: no such entry.
@@ -227,7 +229,7 @@ class Library:
         return entry
 
     def undelete(self, entry_id: int) -> Entry:
-        """Take an entry back that was archived.
+        """Restore an entry that was archived.
 
         Raises:
             NotInLibrary: no such entry.
@@ -241,14 +243,14 @@ class Library:
         return entry
 
     def reported_deleted(self, entry: Entry) -> None:
-        """A file of this station was deleted for good; the audit is reported."""
+        """Record in the audit that a file of this station was deleted permanently."""
         self._record_action("deleted", entry)
 
     def purge(self, before: datetime) -> list[Entry]:
-        """Delete for good what was archived before this time, with contents nothing else names.
+        """Delete entries archived before this time permanently, with contents no other entry uses.
 
         Raises:
-            DatabaseFailed, BlobFailed: some may remain; calling again goes on.
+            DatabaseFailed, BlobFailed: some may remain; another call continues.
         """
         with self.store.writing() as session:
             _guard_contents(session, exclusive=True)
@@ -266,10 +268,10 @@ class Library:
         return gone
 
     def sweep_blobs(self, before: datetime) -> int:
-        """Delete blobs stored before this time that no version names; returns how many.
+        """Delete blobs stored before this time that no version refers to; return their number.
 
-        A crash leaves such, and a purge. One that is younger may be of an entry that somebody
-        is just storing: its row comes after it.
+        Such blobs remain after a crash or a purge. A younger blob may belong to an entry that is
+        just being stored, as its row is written after it.
         """
         with self.store.reading() as session:
             used = set(session.scalars(select(VersionRow.sha256).where(VersionRow.place == "blob")))
@@ -312,9 +314,9 @@ class Library:
 
 
 def _guard_contents(session: Session, *, exclusive: bool) -> None:
-    """Contents that are in the database already are not deleted while a version of them is made.
+    """Lock against deleting stored contents while a new version refers to them.
 
-    SQLite has one writer at a time anyway.
+    SQLite has only one writer at a time anyway.
     """
     if session.get_bind().dialect.name == "postgresql":
         lock = func.pg_advisory_xact_lock if exclusive else func.pg_advisory_xact_lock_shared
@@ -345,7 +347,7 @@ def _loaded(item: Item) -> Entry:
 
 
 def _clean(tags: tuple[str, ...]) -> tuple[str, ...]:
-    """Tags without blanks around and without doubles.
+    """Tags without surrounding spaces and without duplicates.
 
     Raises:
         NotAllowed: too many or too long.

@@ -1,4 +1,4 @@
-"""What the index says of a recording, a measurement and a report."""
+"""Index entries for recordings, measurements and reports."""
 
 from __future__ import annotations
 
@@ -35,10 +35,11 @@ def folders(state: Path) -> list[Folder]:
 
 
 def require_usable(kind: Kind, path: Path) -> None:
-    """A file from elsewhere is what its kind says.
+    """Check that a file from another station is of its stated kind and usable.
 
     Raises:
-        NotAllowed: it is damaged, or something else. OSError: it cannot be read.
+        NotAllowed: the file is damaged, or of another kind.
+        OSError: the file cannot be read.
     """
     if kind == "measurement":
         measurements.unpack(path.read_bytes(), path.name)
@@ -96,7 +97,7 @@ def _report(path: Path) -> Described:
 
 
 def _axis(facts: Mapping[str, object]) -> AxisIdentity:
-    """An identity as headers of files have it; what is no number there is left out."""
+    """An identity from the header of a file; invalid numbers are left out."""
 
     def number(name: str) -> int | None:
         value = facts.get(name)

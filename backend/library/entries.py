@@ -1,4 +1,4 @@
-"""What the library says of the things in it."""
+"""Records of the library: entries, versions and searches."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Literal
 Kind = Literal["set", "recording", "measurement", "report"]
 KINDS: tuple[Kind, ...] = ("set", "recording", "measurement", "report")
 
-#: JSON values that a list shows.
+#: JSON values of facts that a list shows.
 Fact = int | float | str | bool | None
 MAX_TAGS = 20
 MAX_TAG = 60
@@ -19,7 +19,7 @@ MAX_NOTES = 4000
 
 @dataclass(frozen=True, slots=True)
 class AxisIdentity:
-    """The drive that something was made with. ``name`` is the axis's name at that time."""
+    """The drive that an entry was made with. ``name``: the axis' name at that time."""
 
     profile: str = ""
     name: str = ""
@@ -47,7 +47,7 @@ class Version:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something with a name. ``station`` is empty where every station of the database has it."""
+    """A named entry. ``station`` is empty for an entry shared by all stations of the database."""
 
     id: int
     kind: Kind
@@ -63,7 +63,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Addition:
-    """A new version to be stored: what it is of, by whom, and what a list shows of it."""
+    """Data of a new version to be stored: axis, author, and facts that a list shows."""
 
     axis: AxisIdentity = AxisIdentity()
     author: str = ""
@@ -75,7 +75,7 @@ class Addition:
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A search; what is empty does not restrict. ``words`` must all occur, in whatever case."""
+    """A search; empty fields do not restrict it. All ``words`` must occur, in any case."""
 
     words: str = ""
     kinds: tuple[Kind, ...] = ()

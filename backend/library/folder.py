@@ -13,7 +13,7 @@ from drivers.errors import NotAllowed
 
 
 class SetStore(Protocol):
-    """Where parameter sets are kept. Everything blocks and belongs on a thread."""
+    """Storage of parameter sets. All methods block and must run on a thread."""
 
     def load(self, name: str) -> ParameterSet:
         """Read and parse."""
@@ -66,7 +66,7 @@ class SetLibrary:
         """Check and write a file; returns its name. A plain folder keeps no ``tags``.
 
         Raises:
-            BadSet: the contents are no parameter set; nothing is written.
+            BadSet: the contents are not a parameter set; nothing is written.
             NotAllowed: the name exists and ``overwrite`` is False. StorageFailed: disk.
         """
         del tags

@@ -1,4 +1,4 @@
-"""Whether a set was made with the drive that it is to be written to."""
+"""Comparison of a set's identity with the drive to which it is to be written."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from backend.parameters.set_file import ParameterSet
 from drivers.texts.message import Text, text
 
 What = Literal["vendor", "product", "serial", "revision", "firmware"]
-#: What makes it another drive: writing needs consent. The others are only reported.
+#: Differences that show another drive, so that writing needs consent. Others are only reported.
 _OTHER_DRIVE = frozenset({"vendor", "product", "serial"})
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """Something of the identity that differs. ``other_drive``: it is another one for certain."""
+    """One part of the identity that differs. ``other_drive``: it certainly is another drive."""
 
     what: What
     theirs: str
@@ -34,7 +34,7 @@ class Difference:
 
 
 def differences(content: ParameterSet, drive: Drive) -> list[Difference]:
-    """What differs of what both sides know, the gravest first (CiA 301, object 1018h)."""
+    """Differences where both values are known, the most serious first (CiA 301, object 1018h)."""
     found = drive.found
     if found is None:
         return []

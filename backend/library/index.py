@@ -1,9 +1,9 @@
-"""Files of the state folder as entries of the library: listed there, but not copied.
+"""Index of files of the state folder as entries of the library, without copying them.
 
-Recordings, measurements and reports are written by their own parts of the program, straight into
-their folders. The index follows: it compares names, times and sizes with the database, reads what
-is new or changed, and forgets what is gone. It is thus right again after a crash, after retention
-deleted something, and after somebody copied a file in by hand.
+Recordings, measurements and reports are written by their own parts of the program, directly into
+their folders. The index compares names, times and sizes with the database, reads new or changed
+files, and removes entries of deleted ones. It is therefore correct again after a crash, after
+deletions by retention, and after files were copied by hand.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from drivers.texts.answers import sentence
 
 @dataclass(frozen=True, slots=True)
 class Described:
-    """What the index keeps of a file. ``notes`` and ``tags`` only where the file carries them."""
+    """Index data of a file. ``notes`` and ``tags`` only where the file contains them."""
 
     addition: Addition
     notes: str | None = None
@@ -37,7 +37,7 @@ class Described:
 class Folder:
     """A folder that is indexed. ``describe`` may raise NotAllowed for a file that is damaged.
 
-    ``sidecar`` is the ending of a file next to each, whose change counts as well.
+    ``sidecar``: suffix of an accompanying file, whose change counts as well.
     """
 
     kind: Kind
@@ -47,7 +47,7 @@ class Folder:
     sidecar: str = ""
 
     def stamps(self) -> dict[str, str]:
-        """Names of its files, each with what changes when the file does."""
+        """Names of its files, each with a stamp that changes with the file."""
         found: dict[str, str] = {}
         for suffix in self.suffixes:
             for path in self.path.glob(f"*{suffix}"):
@@ -74,7 +74,7 @@ class Index:
         self.folders = {folder.kind: folder for folder in folders}
 
     def path(self, kind: Kind, name: str) -> Path | None:
-        """Where the file of an entry of this station lies, or None where it is gone."""
+        """Path of the file of an entry of this station; None where it is gone."""
         folder = self.folders.get(kind)
         if folder is None or Path(name).name != name:
             return None
@@ -85,7 +85,7 @@ class Index:
         """Bring the entries up to date; files named in ``busy`` are still being written.
 
         Raises:
-            DatabaseFailed: the database; the next refresh goes on.
+            DatabaseFailed: an error of the database; the next refresh continues.
         """
         for folder in self.folders.values():
             self._refresh(folder, busy)
@@ -103,7 +103,7 @@ class Index:
         fresh = {name: s for name, s in here.items() if known.get(name) != s}
         if not gone and not fresh:
             return
-        # Reading files takes its time: outside the transaction.
+        # Reading files takes time, so it is outside the transaction.
         described = {name: self._describe(folder, name, stamp) for name, stamp in fresh.items()}
         with self._store.writing() as session:
             items = {item.name: item for item in session.scalars(ours)}
@@ -146,7 +146,7 @@ class Index:
 
 
 def _put(item: Item, found: Described, path: Path) -> None:
-    """The one version of a file is what it is now."""
+    """Replace the only version of a file's entry by its present state."""
     try:
         status = path.stat()
     except FileNotFoundError:

@@ -1,7 +1,7 @@
-"""Stored measurements: the raw signals, how they were made, and what was concluded.
+"""Stored measurements: raw signals, settings and result.
 
-One file each (``.sdmeas``, a zip as numpy writes it): ``meta`` is JSON, every other member an
-array. Whoever opens it can evaluate it again; see `backend.station.evaluation`.
+One file each (``.sdmeas``, a zip like numpy's .npz): ``meta`` is JSON, every other member an array.
+The raw signals can be evaluated again; see `backend.station.evaluation`.
 """
 
 from __future__ import annotations
@@ -30,23 +30,26 @@ from profiles.schema import Profile
 
 SUFFIX = ".sdmeas"
 VERSION = 1
-#: Unpacked size that no measurement reaches; more is a file made to exhaust the memory.
+#: Largest unpacked size; no measurement reaches it, a larger file is made to exhaust the memory.
 _MAX_UNPACKED = 1024 * 1024 * 1024
-#: Of the JSON of one file. Those of our tools have some ten KiB, with curves of thousands of points
-#: 1 MiB; a decoder of JSON lets no other thread run until it has ended (20 ms a MiB).
+#: Largest size of the JSON of a file. Tools write some ten KiB, with curves of thousands of points
+#: 1 MiB. The JSON decoder blocks all other threads until it has ended (20 ms per MiB).
 _MAX_HEAD = 4 * 1024 * 1024
 Arrays = dict[str, npt.NDArray[np.generic]]
 
 
 class BadMeasurement(NotAllowed):
-    """A file that is not a measurement, or is damaged."""
+    """A file is not a measurement, or is damaged."""
 
     kind = "bad-measurement"
 
 
 @dataclass(frozen=True)
 class Head:
-    """``meta`` holds settings and facts of the tool, identity, profile, time, and the result."""
+    """Header of a measurement.
+
+    ``meta``: settings and facts of the tool, identity, profile, time, and the result.
+    """
 
     kind: str
     saved: datetime
@@ -56,14 +59,14 @@ class Head:
 
 @dataclass(frozen=True)
 class Measurement:
-    """A whole file: what it says of itself, and the raw signals [n] by name."""
+    """A whole file: its header, and the raw signals [n] by name."""
 
     head: Head
     arrays: Arrays
 
     @property
     def kind(self) -> str:
-        """Tool and what it measured, such as ``sweep-mechanics``."""
+        """Tool and kind of measurement, such as ``sweep-mechanics``."""
         return self.head.kind
 
     @property
@@ -73,7 +76,7 @@ class Measurement:
 
 
 def profile_version(profile: Profile) -> str:
-    """Twelve hex digits that change with anything that the profile says."""
+    """Twelve hex digits of a hash over the whole profile."""
     return hashlib.sha256(profile.model_dump_json().encode()).hexdigest()[:12]
 
 
@@ -85,7 +88,7 @@ def pack(
     saved: datetime,
     result: Mapping[str, object] | None = None,
 ) -> bytes:
-    """A file's contents."""
+    """Contents of the file of a measurement."""
     found = drive.found
     head = {
         **meta,
@@ -121,7 +124,7 @@ def pack_other(
     saved: datetime,
     result: Mapping[str, object] | None = None,
 ) -> bytes:
-    """A file's contents where no drive of this station measured; ``title`` stands for its name."""
+    """Contents of a file that was not measured on a drive here; ``title`` replaces its name."""
     head = {
         **meta, "version": VERSION, "kind": kind, "saved": saved.isoformat(), "drive": title,
         "program": backend.__version__, "profile": "", "profile_version": "", "identity": None,
@@ -163,10 +166,10 @@ def unpack(data: bytes, name: str = "the file") -> Measurement:
 
 
 def unpack_head(file: Path) -> Head:
-    """What a file says of itself, without its signals.
+    """Header of a file, without reading its signals.
 
     Raises:
-        BadMeasurement: as `unpack`; damage in the signals is not seen.
+        BadMeasurement: as `unpack`; damage of the signals is not detected.
     """
     with _reported(file.name), zipfile.ZipFile(file) as archive:
         _require_small_head(archive)
@@ -189,7 +192,7 @@ def _head(text: npt.NDArray[np.generic], name: str) -> Head:
 
 @contextmanager
 def _reported(name: str) -> Iterator[None]:
-    """Whatever a damaged file makes its readers say becomes one kind of error."""
+    """Convert all errors that a damaged file causes to BadMeasurement."""
     try:
         yield
     except (
@@ -216,10 +219,10 @@ class MeasurementStore:
         meta: Mapping[str, object],
         result: Mapping[str, object] | None = None,
     ) -> str:
-        """Write a new file; returns its name.
+        """Write a new file; return its name.
 
         Raises:
-            StorageFailed: the disk.
+            StorageFailed: the file cannot be written.
         """
         saved = datetime.now(UTC)
         stem = f"{saved:%Y%m%d-%H%M%S}-{kind}-{drive.id}"
@@ -232,12 +235,13 @@ class MeasurementStore:
     def conclude(
         self, name: str, result: Mapping[str, object], verdict: Mapping[str, object] | None = None
     ) -> None:
-        """Add to a file what was concluded from it, so that a later evaluation can be compared.
+        """Add the result to a file, so that a later evaluation can be compared with it.
 
-        ``verdict`` on a tuned loop rests on other measurements as well, and is kept as it is.
+        ``verdict`` on a tuned loop is based on other measurements as well, and is stored unchanged.
 
         Raises:
-            NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
+            NotAllowed: no such file.
+            StorageFailed: the file cannot be written and is unchanged.
         """
         more = {} if verdict is None else {"verdict": verdict}
         self._add(self.load(name), name, {"result": result, **more})
@@ -245,10 +249,11 @@ class MeasurementStore:
     def sign(
         self, name: str, signature: Mapping[str, object], result: Mapping[str, object]
     ) -> None:
-        """Add who signed a file, and the conclusion that was signed.
+        """Add the signature to a file, and the result that was signed.
 
         Raises:
-            NotAllowed: no such file. StorageFailed: the disk; the file is as it was.
+            NotAllowed: no such file.
+            StorageFailed: the file cannot be written and is unchanged.
         """
         self._add(self.load(name), name, {"signature": signature, "result": result})
 
@@ -281,7 +286,7 @@ class MeasurementStore:
         return unpack(self.read(name), name)
 
     def path(self, name: str) -> Path:
-        """Where a file of this name lies, or would.
+        """Path of a file of this name, whether it exists or not.
 
         Raises:
             NotAllowed: not a plain file name.
@@ -289,7 +294,7 @@ class MeasurementStore:
         return self.folder / checked_name(name, SUFFIX)
 
     def head(self, name: str) -> Head:
-        """What a file says of itself.
+        """Header of a file.
 
         Raises:
             NotAllowed: no such file. BadMeasurement: not usable.
@@ -300,7 +305,7 @@ class MeasurementStore:
         return unpack_head(path)
 
     def store(self, name: str, data: bytes) -> str:
-        """Take a file from elsewhere; returns its name.
+        """Import a file; return its name.
 
         Raises:
             BadMeasurement: nothing is written. NotAllowed: the name exists.

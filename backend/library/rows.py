@@ -1,4 +1,4 @@
-"""Between the library's tables and what it says: rows to values, searches to queries."""
+"""Conversion between the library's tables and its records: rows to records, searches to queries."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def entry(item: Item) -> Entry:
 
 
 def version(row: VersionRow) -> Version:
-    """One version."""
+    """A version from its row."""
     return Version(
         number=row.number,
         saved=row.saved,
@@ -55,7 +55,7 @@ def version(row: VersionRow) -> Version:
 def new_version(
     number: int, place: str, digest: str, size: int, addition: Addition, now: datetime
 ) -> VersionRow:
-    """The row of a version to be."""
+    """The row of a new version."""
     axis = addition.axis
     return VersionRow(
         number=number,
@@ -77,7 +77,7 @@ def new_version(
 
 
 def words(item: Item) -> str:
-    """Everything that a search looks through, in lower case."""
+    """All text that a search covers, in lower case."""
     latest = item.versions[-1]
     parts = [
         item.name, item.notes, *(tag.tag for tag in item.tags), latest.notes, latest.author,
@@ -89,7 +89,7 @@ def words(item: Item) -> str:
 
 
 def matching(query: Query) -> Select[Item]:
-    """The items of a search, in no order."""
+    """Query for the items of a search, without an order."""
     found = select(Item)
     found = found.where(Item.deleted.is_not(None) if query.deleted else Item.deleted.is_(None))
     for word in query.words.lower().split():

@@ -1,4 +1,4 @@
-"""Parameter sets in the library, by name; and the folder from which plain files are imported."""
+"""Parameter sets in the library, by name, and the folder from which files are imported."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TAKEN = "imported"
 
 
 def addition_of(content: ParameterSet, *, tags: Sequence[str] = ()) -> Addition:
-    """What the library keeps of a set next to its text."""
+    """Data that the library stores with the contents of a set."""
     return Addition(
         axis=AxisIdentity(
             profile=content.profile,
@@ -38,10 +38,10 @@ def addition_of(content: ParameterSet, *, tags: Sequence[str] = ()) -> Addition:
 
 
 class LibrarySets:
-    """Sets of the library under their file names (``….sdset``). All of it blocks.
+    """Sets of the library under their file names (``….sdset``). All methods block.
 
-    Files that lie in ``folder`` (from an earlier version, or put there by hand) are imported when
-    sets are listed, and then lie in its sub-folder ``imported``; those that are no sets stay.
+    Files in ``folder`` (from an earlier version, or put there by hand) are imported when sets are
+    listed, and moved to its sub-folder ``imported``; files that are not sets stay.
     """
 
     def __init__(self, library: Library, folder: Path) -> None:
@@ -49,7 +49,7 @@ class LibrarySets:
         self.folder = folder
 
     def names(self) -> list[str]:
-        """Names, newest first; at their end those of files that cannot be imported."""
+        """Names, newest first, followed by those of files that cannot be imported."""
         problems = self.take_in()
         return [entry.name for entry in self.entries()] + sorted(problems)
 
@@ -77,7 +77,7 @@ class LibrarySets:
         """
         path = self.folder / checked_name(name, SUFFIX)
         if self.library.named("set", path.name) is None and path.is_file():
-            return path.read_bytes()  # one that cannot be imported
+            return path.read_bytes()  # a file that cannot be imported
         return self.library.content(self.entry(name).id, number)
 
     def load(self, name: str, number: int | None = None) -> ParameterSet:
@@ -104,7 +104,7 @@ class LibrarySets:
         return self.library.add("set", name, data, addition_of(content, tags=tags)).name
 
     def delete(self, name: str) -> None:
-        """Put a set aside.
+        """Archive a set; a file that cannot be imported is deleted.
 
         Raises:
             NotAllowed: there is none of this name.
@@ -116,9 +116,10 @@ class LibrarySets:
         self.library.delete(self.entry(name).id)
 
     def take_in(self) -> dict[str, Text]:
-        """Take in the files of the folder; returns those that cannot be, and why.
+        """Import the files of the folder; return those that cannot be imported, with the reason.
 
-        A file is moved after its contents are stored: a crash between stores nothing twice.
+        A file is moved after its contents are stored. After a crash in between it is imported
+        again, which makes no new version.
         """
         problems: dict[str, Text] = {}
         for path in sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: p.stat().st_mtime):

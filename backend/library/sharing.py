@@ -1,7 +1,7 @@
-"""Files of one station's folders for the other stations of a shared library, and back.
+"""Sharing files of one station's folders with the other stations of a shared library.
 
-Sharing copies: into the library's contents, from which any station takes a copy into its own
-folder, where it is opened like any other. Both copies are compared with their SHA-256 on the way.
+A file is copied into the library's contents. From there any station can copy it into its own
+folder, where it is opened like any other. Both copies are verified by their SHA-256.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from backend.store.files import StorageFailed, write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 
-#: Contents pass through the memory on their way to and from the store.
+#: Largest file; contents are held in memory on their way to and from the store.
 MOST_BYTES = 256 << 20
-#: Kept by the index for itself; of a copy it would be wrong.
+#: Fact that the index stores for its own use; it does not hold for a copy.
 _STAMP = "stamp"
 
 
 def shared_name(station: str, name: str) -> str:
-    """Two stations may have files of one name: in the library each has its station's before it."""
+    """Name of a shared file, preceded by its station's name, as stations may have equal names."""
     plain = re.sub(r"[^\w.\-]", "-", station).strip(".-")[:30] or "station"
     return f"{plain} {name}"
 
 
 def share(library: Library, index: Index, entry: Entry) -> Entry:
-    """Copy a file of this station into the library. What is there already makes no new version.
+    """Copy a file of this station into the library. Equal contents make no new version.
 
     Raises:
-        NotAllowed: it is shared by itself, is gone, or too large. StorageFailed: the store.
+        NotAllowed: the entry is shared already, its file is gone, or it is too large.
+        StorageFailed: an error of the store.
     """
     path = index.path(entry.kind, entry.name) if entry.station else None
     if path is None:
@@ -55,11 +56,11 @@ def share(library: Library, index: Index, entry: Entry) -> Entry:
 
 
 def fetch(library: Library, index: Index, entry: Entry) -> str:
-    """Copy shared contents into this station's folder; returns the file's name.
+    """Copy shared contents into this station's folder; return the file's name.
 
     Raises:
-        NotAllowed: nothing that opens from a folder, damaged, or another file has this name.
-        StorageFailed: store or disk.
+        NotAllowed: not a kind that is stored in folders, damaged, or another file has this name.
+        StorageFailed: an error of store or disk.
     """
     folder = index.folders.get(entry.kind)
     if folder is None or entry.station:
@@ -72,7 +73,7 @@ def fetch(library: Library, index: Index, entry: Entry) -> str:
         if path.read_bytes() == data:
             return entry.name
         raise NotAllowed("library.another-station-already", value=entry.name)
-    # Looked at under a name that no list shows, so that nobody opens what is damaged.
+    # Checked under a hidden name, so that nobody opens a damaged file.
     waiting = path.with_name(f".{path.name}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Three-way comparison: what changed since a common base, there and in the drive."""
+"""Three-way comparison: changes since a common base, in another set and in the drive."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ Status = Literal[
 class Triple:
     """One parameter in base, theirs and drive; raw values, None where absent.
 
-    ``theirs``: changed only there. ``drive``: changed only in the drive. ``both``: changed to the
-    same. ``conflict``: changed differently, or the base does not know it; a person must choose.
+    ``theirs``: changed only in the other set. ``drive``: changed only in the drive. ``both``:
+    changed to the same value. ``conflict``: changed to different values, or not in the base; a
+    person must choose.
     """
 
     parameter: Parameter | None
@@ -39,7 +40,7 @@ class Triple:
 def three_way(
     drive: Drive, base: Iterable[Row], theirs: Iterable[Row], ours: dict[str, Reading]
 ) -> list[Triple]:
-    """Rows of two sets against readings of the drive. Only clear changes there are selected."""
+    """Compare rows of two sets with readings of the drive; only status ``theirs`` is selected."""
     before = {row.key: row.raw for row in base}
     result = []
     for row in compare(drive, theirs, ours):

@@ -1,1 +1,1 @@
-"""Parameter sets as files, and as lists of other tools."""
+"""Parameter sets as files, and as lists in formats of other tools."""

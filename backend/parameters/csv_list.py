@@ -1,9 +1,9 @@
-"""Parameter lists as CSV: export of a set, and import of lists as other tools write them.
+"""Parameter lists as CSV: export of a set, and import of lists from other tools.
 
-Read are lists with a heading (``key`` or ``index`` and ``subindex``, with ``raw`` or ``value``)
-and bare lists of ``key, raw`` or ``index, subindex, raw``. Comma, semicolon or tabulator separate;
-lines that begin with ``#`` are comments. ``raw`` is the number that travels; ``value`` is in the
-parameter's unit. A bad line spoils only itself.
+Accepted are lists with a heading (``key`` or ``index`` and ``subindex``, with ``raw`` or ``value``)
+and lists without one (``key, raw`` or ``index, subindex, raw``). The separator is a comma,
+semicolon or tabulator; lines that begin with ``#`` are comments. ``raw`` is the value as
+transferred; ``value`` is in the parameter's unit. A bad line does not affect the others.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from drivers.texts.message import Text, Unsuitable, text
 from profiles.schema import Parameter, Profile, Raw
 
 _MAX_LINES = 20_000
-#: The last two are what spreadsheets of Western and Chinese systems write.
+#: The last two are the encodings of spreadsheets on Western and Chinese systems.
 _ENCODINGS = ["utf-8-sig", "cp1252", "gb18030"]
 _KEY = re.compile(r"(?:0x)?([0-9a-f]{4})(?:h?[:.\s_/-]\s*|sub)(?:0x)?([0-9a-f]{1,2})h?", re.I)
 _INDEX = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{4})h?)", re.I)
-#: What a spreadsheet writes and expects in front of a list.
+#: Line with the separator that a spreadsheet writes and expects in front of a list.
 _SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?', re.I)
 _SAME_UNIT = {"r/min": "rpm", "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "sec": "s"}
 _HEADINGS = {
@@ -40,7 +40,7 @@ _HEADINGS = {
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Numbers of the columns; -1 where there is none. Bare lists: the last one is raw."""
+    """Numbers of the columns; -1 for a missing one. Without a heading the last column is raw."""
 
     key: int = -1
     index: int = -1
@@ -52,7 +52,7 @@ class _Columns:
 
 @dataclass(frozen=True, slots=True)
 class ParameterList:
-    """Rows that can go on, and a message for each line that cannot."""
+    """Usable rows, and a message for each line that is not usable."""
 
     readings: tuple[Reading, ...]
     problems: tuple[Text, ...]
@@ -81,7 +81,7 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     """Read a list for drives of ``profile``.
 
     Raises:
-        BadSet: too large, no text, or no line of it is a parameter of this family.
+        BadSet: too large, not a text, or no line is a parameter of this family.
     """
     if len(data) > MAX_BYTES:
         raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
@@ -120,7 +120,7 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
 
 
 def first(problems: Sequence[Text]) -> Text | str:
-    """The first problem, as it stands in the message that nothing could be read."""
+    """The first problem, as part of the message that nothing could be read."""
     return text("sets.first-problem", problem=problems[0]) if problems else ""
 
 
@@ -147,8 +147,10 @@ def _lines(content: str) -> tuple[list[int], list[str]]:
 
 
 def _separator(content: str) -> str:
-    """As a spreadsheet's first line says; else of the first line that is no comment: tabulator
-    before semicolon before comma.
+    """The separator.
+
+    It is taken from a spreadsheet's first line. Otherwise it is the first of tabulator, semicolon
+    and comma in the first line that is not a comment.
     """
     reported = _SEPARATOR_LINE.fullmatch(content.partition("\n")[0].strip(" \r"))
     if reported is not None:
@@ -158,7 +160,7 @@ def _separator(content: str) -> str:
 
 
 def _headed(cells: list[str]) -> _Columns | None:
-    """Columns by their headings; None where this line is no heading."""
+    """Columns by their headings; None where this line is not a heading."""
     places: dict[str, int] = {}
     for place, cell in enumerate(cells):
         title = cell.strip().lower()
@@ -171,7 +173,7 @@ def _headed(cells: list[str]) -> _Columns | None:
 
 
 def _bare(cells: list[str]) -> _Columns:
-    """``key, raw`` or ``index, subindex, raw``."""
+    """Columns of a list without heading: ``key, raw`` or ``index, subindex, raw``."""
     if cells and _KEY.fullmatch(cells[0].strip()):
         return _Columns(key=0, raw=1)
     if cells and len(cells) >= 3 and _INDEX.fullmatch(cells[0].strip()):
@@ -224,7 +226,7 @@ def _parameter(key: str, index: str, subindex: str, profile: Profile) -> Paramet
 
 
 def _same_unit(theirs: str, ours: str) -> bool:
-    """Whether a list's unit is the parameter's; a list need not name any."""
+    """Whether a list's unit is the parameter's; True where the list has none."""
 
     def plain(unit: str) -> str:
         bare = unit.strip(" []()").casefold().replace("\u00b5", "\u03bc").replace("^", "")
@@ -247,7 +249,7 @@ def _value(parameter: Parameter, word: str, separator: str) -> Raw:
     if (whole := _whole(word)) is not None:
         return whole
     if separator != "," and re.fullmatch(r"[+-]?[1-9]\d{0,2}([,.])\d{3}(\1\d{3})*", word, re.A):
-        # 1,000 and 1.000 are a thousand to one person and one to another.
+        # 1,000 and 1.000 may each mean one thousand or one, depending on the country.
         raise Unsuitable(text("sets.line-two-ways", key=parameter.key, word=word))
     if separator != ",":
         word = word.replace(",", ".")

@@ -1,4 +1,4 @@
-"""Parameter sets as device configuration files (CiA 306-1 v1.3), as CANopen tools exchange them."""
+"""Parameter sets as device configuration files (CiA 306-1 v1.3), the format of CANopen tools."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from profiles.schema import Profile, Raw
 def write_dcf(
     profile: Profile, rows: Iterable[Row], *, file_name: str, node_name: str, created: datetime
 ) -> tuple[str, int]:
-    """The file's text, and how many rows have no object and so no place in it."""
+    """The file's text, and the number of rows left out because they have no object."""
     values: dict[str, Raw] = {}
     left_out = 0
     for row in rows:
@@ -43,7 +43,7 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
     """Values that a DCF configures, for drives of ``profile``.
 
     Raises:
-        BadSet: too large, damaged, an EDS without values, or of another kind of drive.
+        BadSet: too large, damaged, an EDS without values, or for another kind of drive.
     """
     report = ImportReport()
     readings: dict[str, Reading] = {}
@@ -78,11 +78,13 @@ def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> Parameter
 
 
 def _of_another_drive(data: bytes, profile: Profile, name: str) -> list[Text]:
-    """What the file says of its drive against the profile: the same numbers of another maker's
-    drive mean something else.
+    """Compare the identity in the file with the profile; a warning for another product.
+
+    The same objects have other meanings in another maker's drive.
 
     Raises:
-        BadSet: another maker's. ImportFailed: too big.
+        BadSet: the file is for another maker's drive.
+        ImportFailed: too large.
     """
     vendor, product = read_dcf_identity(data, name)
     ours = profile.identity

@@ -1,4 +1,4 @@
-"""Lists of parameters in the formats of other tools, distinguished by contents and name."""
+"""Parameter lists in formats of other tools, distinguished by contents and name."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ from drivers.link import Found
 from profiles.importer import is_dcf, read_dcf_identity
 from profiles.schema import Profile
 
-#: Problems of a list that its notes name at the most; the answer has the first 200 as well.
+#: Largest number of problems of a list in its notes; the API's answer has as many.
 _NOTED = 200
 
 
 def import_list(
     data: bytes, profile: Profile, name: str, saved: datetime
 ) -> tuple[bytes, ParameterList]:
-    """A parameter set (its file's bytes) of a CSV list or a DCF, and what was read.
+    """The file of a parameter set made from a CSV list or a DCF, and the list as read.
 
     Raises:
-        BadSet: no such list, or nothing in it belongs to ``profile``.
+        BadSet: not such a list, or nothing in it belongs to ``profile``.
     """
-    # A list names no drive: the set must not claim to have been saved from one.
+    # A list states no drive, so the set must not name one as its source.
     source = Drive("", f"list {name}", profile, [])
     if is_dcf(data):
         found = read_dcf(data, profile, name)
         vendor, product = read_dcf_identity(data, name)
         if vendor is not None:
-            # Loading it asks about drives of another kind, as with a set of our own.
+            # So loading it warns at a drive of another kind, as for a set of servodeck.
             source.found = Found(0, vendor_id=vendor, product_code=product)
     else:
         found = read_csv(data, profile, name)
-    # Words are slow to make, and the notes hold no more than the first ones.
+    # Texts are slow to make, and the notes hold only the first ones.
     problems = map(str, found.problems[:_NOTED])
     notes = "\n".join(("imported from a list", *problems))[:4000]
     return dump(source, found.readings, author="", notes=notes, saved=saved), found
 
 
 def export_list(content: ParameterSet, profile: Profile, name: str, created: datetime) -> bytes:
-    """A parameter set as DCF where ``name`` ends so, else as CSV with a byte order mark."""
+    """A parameter set as DCF where ``name`` ends in .dcf, else as CSV with a byte order mark."""
     if not name.lower().endswith(".dcf"):
-        # Spreadsheets take a file without the mark for one of their own code page.
+        # Without the mark, spreadsheets read a file in their own code page.
         return write_csv(profile, content.rows).encode("utf-8-sig")
     text, _ = write_dcf(
         profile, content.rows, file_name=name, node_name=content.drive_name, created=created

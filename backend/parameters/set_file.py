@@ -1,8 +1,8 @@
 """Parameter sets as files: an open, readable, versioned text format (TOML).
 
-The format is described in docs/parameter-sets.md. A file ends with an ``[end]`` table, so that
-a truncated one is noticed even when the cut falls between two rows. A bad row spoils only
-itself; a file that is damaged as a whole is refused.
+The format is described in docs/parameter-sets.md. A file ends with an ``[end]`` table, so that a
+truncated file is detected even when the cut is between two rows. A bad row does not affect the
+others; a file that is damaged as a whole is refused.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FORMAT = "servodeck parameter set"
 VERSION = 1
 SUFFIX = ".sdset"
 MAX_BYTES = 4_000_000
-#: The format has no dotted key at all; this leaves room for tables that a later version adds.
+#: The format has no dotted keys; this leaves room for tables of later versions.
 _DEEPEST_KEY = 8
 
 Status = Literal[
@@ -36,7 +36,7 @@ Status = Literal[
 
 
 class BadSet(NotAllowed):
-    """A file that cannot be used as a parameter set, and why."""
+    """A file cannot be used as a parameter set; the message states why."""
 
     kind = "bad-parameter-set"
 
@@ -85,10 +85,10 @@ class Difference:
 
 
 def storable(profile: Profile, *, motor_individual: bool) -> list[Parameter]:
-    """Parameters that belong into a set: readable and writable settings.
+    """Parameters that belong in a set: readable and writable settings.
 
-    Left out: commands and setpoints, the communication area 1000h–1FFFh (its mapping objects
-    depend on the master), and what belongs to one motor unless asked for.
+    Left out: commands and setpoints, the communication area 1000h–1FFFh (its mapping objects depend
+    on the master), and parameters of the individual motor unless ``motor_individual``.
     """
     commands = {
         step.key for proc in profile.procedures for step in proc.steps if step.do == "write"
@@ -111,7 +111,7 @@ def storable(profile: Profile, *, motor_individual: bool) -> list[Parameter]:
 def dump(
     drive: Drive, readings: Iterable[Reading], *, author: str, notes: str, saved: datetime
 ) -> bytes:
-    """The file of these readings; those that failed are left out and named at its end."""
+    """The file of these readings; those without a value are left out and named at its end."""
     profile, found = drive.profile, drive.found
     lines = [
         f"# {FORMAT}; see docs/parameter-sets.md. Values are written from `raw`;",
@@ -165,7 +165,7 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     """Read a file.
 
     Raises:
-        BadSet: not such a file, of a newer version, damaged or truncated.
+        BadSet: not a parameter set, of another version, damaged or truncated.
     """
     if len(data) > MAX_BYTES:
         raise BadSet("sets.larger-bytes", name=name, max_bytes=MAX_BYTES)
@@ -213,7 +213,7 @@ def _keys(table: object, field: str) -> tuple[str, ...]:
 
 def _number(table: dict[str, Any], field: str) -> int | None:
     value = table.get(field)
-    # A database holds 64 bits with sign; identity objects have 32 (CiA 301 clause 7.5.2.19).
+    # The database holds signed 64 bits; identity objects have 32 (CiA 301 clause 7.5.2.19).
     known = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 63
     return value if known else None
 
@@ -237,7 +237,7 @@ def _row(row: object, number: int) -> Row:
 
 
 def compare(drive: Drive, rows: Iterable[Row], ours: dict[str, Reading]) -> list[Difference]:
-    """Rows of a file (or of another drive, or defaults) against readings of this drive."""
+    """Compare rows of a file (or of another drive, or defaults) with readings of this drive."""
     result: list[Difference] = []
     seen: set[str] = set()
     for row in rows:

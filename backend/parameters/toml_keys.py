@@ -1,16 +1,16 @@
-"""How deep the keys of a TOML text are, before a parser reads it.
+"""Depth of the dotted keys of a TOML text, checked before parsing.
 
-`tomllib` takes the square of the number of parts of a dotted key (``a.b.c``), so that a file of
-50 kB with one such key occupies it for minutes.
+The time of `tomllib` grows with the square of the number of parts of a dotted key (``a.b.c``), so
+that a file of 50 kB with one such key takes minutes.
 """
 
 from __future__ import annotations
 
 import re
 
-#: What ends a key, begins a string or a comment, or is a dot.
+#: Characters that end a key or begin a string or comment, and dots.
 _SIGN = re.compile(r"""\"{3}|'{3}|["'.#=,{}\[\]\n]""")
-#: What matters within a string in double quotes, of one line and of several lines.
+#: Escapes and ends within strings in double quotes, of one line and of several lines.
 _WITHIN = {
     '"': re.compile(r'\\.|["\n]', re.DOTALL),
     '"""': re.compile(r'\\.|"{3}', re.DOTALL),
@@ -18,9 +18,9 @@ _WITHIN = {
 
 
 def deepest_key(content: str) -> int:
-    """Parts of the longest dotted key, in time that grows with the length of the text alone.
+    """Number of parts of the longest dotted key; its time is proportional to the text's length.
 
-    Dots of numbers and dates are counted as those of keys; dots of strings and comments are not.
+    Dots of numbers and dates are counted like those of keys; dots of strings and comments are not.
     """
     most = dots = at = 0
     while (found := _SIGN.search(content, at)) is not None:

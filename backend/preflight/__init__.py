@@ -1,5 +1,5 @@
-"""Is this computer punctual enough: what hinders it, what was measured, what would help most.
+"""Check of the computer's timing: obstacles, measurement, and the most effective remedy.
 
-`findings` (what the facts of the computer mean) and `verdicts` (what was measured means) are pure;
-`fixes` changes settings and undoes it; `run` measures; `texts` has the words of both languages.
+`findings` (from the facts of the computer) and `verdicts` (from the measurement) have no I/O;
+`fixes` changes and restores settings; `run` measures; `texts` has the texts in both languages.
 """

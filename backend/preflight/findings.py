@@ -1,4 +1,4 @@
-"""What the facts of a computer mean for EtherCAT in real time: typed, the worst first."""
+"""Obstacles to real-time EtherCAT, derived from the facts of a computer, the worst first."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.computer.permissions import NEEDED
 
 
 class Code(StrEnum):
-    """What hinders."""
+    """Kind of obstacle."""
 
     NO_INTERFACE = "no_interface"
     MISSING_CAPABILITY = "missing_capability"
@@ -36,12 +36,12 @@ class Code(StrEnum):
 
 
 class Effect(IntEnum):
-    """How it hinders; the worst first."""
+    """Effect of an obstacle, the worst first."""
 
     BLOCKS = 0
-    """No frame gets through."""
+    """No frame is transmitted."""
     INTERRUPTS = 1
-    """The bus can fail for seconds in the midst of work."""
+    """The bus can fail for seconds during operation."""
     DELAYS = 2
     """Cycles come late."""
 
@@ -58,7 +58,7 @@ class Fix(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """``delay_us`` is the delay that one cycle may get by it, where it DELAYS; 0 otherwise."""
+    """One obstacle. ``delay_us``: possible delay of a cycle where it DELAYS, otherwise 0 [µs]."""
 
     code: Code
     effect: Effect
@@ -67,23 +67,23 @@ class Finding:
     fix: Fix | None = None
 
 
-#: Turn of a fair task on the processor: base_slice_ns of the kernel with up to 8 cores
+#: Time slice of a task of the fair scheduler [µs]: base_slice_ns of the kernel with up to 8 cores
 #: (kernel/sched/fair.c: 0.75 ms x (1 + ilog2(cores)), at most 4 times it).
 _FAIR_TURN_US = 3000.0
 _BUSY_SHARE, _STOLEN_SHARE = 0.7, 0.01
 _QUICK_IDLE_US = 20
-#: A page that was written out comes back from a disk within a few ms.
+#: Time to read a swapped-out page from a disk [µs].
 _PAGE_FAULT_US = 5000.0
-#: Raising a processor's clock: cpuinfo_transition_latency of common drivers is at most this.
+#: Time to raise the processor's clock [µs]: the largest common cpuinfo_transition_latency.
 _CLOCK_CHANGE_US = 100.0
 _GROUPING_US = 20.0
 _MOVED_INTERRUPT_US = 50.0
 _SECTION_US = 200.0
-"""Longest stretch in the kernel that is not left for a waking thread, without PREEMPT_RT."""
+"""Longest non-preemptible section of the kernel without PREEMPT_RT [µs]."""
 
 
 def findings(facts: HostFacts) -> list[Finding]:
-    """Everything that hinders, the one whose removal would help most first."""
+    """All obstacles, first the one whose removal would help most."""
     found = [*_processor(facts)]
     if facts.port is not None:
         found += [*_permission(facts), *_port(facts.port), *_card(facts, facts.port)]
@@ -121,13 +121,13 @@ def _processor(facts: HostFacts) -> Iterator[Finding]:
     if facts.discharging:
         yield Finding(Code.ON_BATTERY, Effect.INTERRUPTS)
     if not facts.fifo_allowed:
-        # A real-time thread goes before all others, so that their load matters without it alone.
+        # A real-time thread has priority, so the load of other threads only matters without it.
         busiest = max(facts.busy, default=0.0)
         if busiest > _BUSY_SHARE:
             yield _delay(Code.BUSY_CORE, _FAIR_TURN_US, share=busiest)
         yield _delay(Code.NO_REAL_TIME, _FAIR_TURN_US / 2)
     if not facts.memory_lock_allowed:
-        # Only under pressure for memory, which most computers never have.
+        # Only when memory is short, which is rare on most computers; hence a tenth.
         yield _delay(Code.MEMORY_NOT_LOCKED, _PAGE_FAULT_US / 10)
     if facts.stolen > _STOLEN_SHARE:
         yield _delay(Code.STOLEN_TIME, _FAIR_TURN_US, share=facts.stolen)

@@ -1,8 +1,8 @@
-"""Settings of the computer that are changed with a press, and restored with another.
+"""Settings of the computer that servodeck changes and restores on request.
 
-What was there is on the disk before anything is changed (``preflight-restore.json`` in the state
-folder), so that it can be restored after a crash as well. A setting that somebody has changed
-since is left as it is. A restart of the computer restores all of them by itself.
+The earlier values are on the disk before anything is changed (``preflight-restore.json`` in the
+state folder), so that they can be restored after a crash as well. A setting that somebody has
+changed since is left as it is. A restart of the computer restores all of them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _QUICK_IDLE_US = 20
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """A setting with the value before and the one that was set."""
+    """A changed setting with its earlier and its new value."""
 
     fix: Fix
     setting: Setting
@@ -35,7 +35,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Undone:
-    """What was restored, and what was left because somebody had changed it since."""
+    """Changes that were restored, and those left because somebody had changed the setting since."""
 
     restored: list[Change]
     left: list[Change]
@@ -49,7 +49,11 @@ class Fixes:
     settings: HostSettings = field(default_factory=HostSettings)
 
     def pending(self) -> list[Change]:
-        """What is changed now and can be restored, oldest first."""
+        """Changes that can be restored, oldest first.
+
+        Raises:
+            NotAllowed: the restore list cannot be read.
+        """
         try:
             listed = json.loads((self.folder / RESTORE_LIST).read_text("utf-8"))
             return [_change(one) for one in listed]
@@ -62,10 +66,10 @@ class Fixes:
             ) from error
 
     def apply(self, fix: Fix, interface: str) -> list[Change]:
-        """Make a change; what is set already is not set again.
+        """Apply a fix; settings that have the value already are not written.
 
         Raises:
-            NotAllowed: not permitted, or the computer does not take it; nothing stays changed.
+            NotAllowed: not permitted, or refused by the system; nothing stays changed.
         """
         facts = self.settings.computer.facts(interface)
         wanted = [
@@ -96,10 +100,10 @@ class Fixes:
         return wanted
 
     def undo(self) -> Undone:
-        """Restore everything, the latest change first.
+        """Restore all changes, the latest first.
 
         Raises:
-            NotAllowed: not permitted; what could not be restored stays in the list.
+            NotAllowed: not permitted; changes that could not be restored stay in the list.
         """
         changes, restored, left = self.pending(), [], []
         while changes:
@@ -122,7 +126,7 @@ class Fixes:
         return Undone(restored, left)
 
     def _keep(self, changes: list[Change]) -> None:
-        """On the disk, or an error before anything is changed."""
+        """Write the restore list to the disk, flushed, before anything is changed."""
         listed = [
             {
                 "fix": one.fix,
@@ -148,7 +152,7 @@ def _change(kept: dict[str, str]) -> Change:
 
 
 def _wanted(fix: Fix, facts: HostFacts) -> Iterator[tuple[Setting, str]]:
-    """The settings of a fix with the values that they get."""
+    """The settings of a fix with their new values."""
     if fix is Fix.GOVERNOR:
         yield from ((Setting(file), "performance") for file in facts.governors)
     elif fix is Fix.IDLE:

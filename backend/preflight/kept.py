@@ -1,4 +1,4 @@
-"""The last measurement of each interface, kept over restarts in ``preflight.json``."""
+"""The last measurement of each interface, stored in ``preflight.json``."""
 
 from __future__ import annotations
 
@@ -15,15 +15,16 @@ FILE = "preflight.json"
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """``measured`` by period in µs, and when it ended (seconds since the epoch)."""
+    """One measurement: ``measured`` by period [µs]; ``ended`` in seconds since 1970."""
 
     measured: Mapping[int, Measured]
     ended: float
 
 
 def read(folder: Path) -> dict[str, Kept]:
-    """By interface (empty: without one). Nothing where the file is not there or damaged: it is
-    measured again.
+    """The stored measurements by interface (empty name: measured without one).
+
+    Empty where the file is missing or damaged; it can be measured again.
     """
     try:
         listed = json.loads((folder / FILE).read_text("utf-8"))
@@ -39,7 +40,7 @@ def read(folder: Path) -> dict[str, Kept]:
 
 
 def keep(folder: Path, interface: str, measured: Mapping[int, Measured]) -> None:
-    """Keep it in place of the one before.
+    """Store a measurement in place of the earlier one of its interface.
 
     Raises:
         OSError: the folder cannot be written.

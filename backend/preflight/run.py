@@ -1,4 +1,4 @@
-"""One preflight: facts, the measurement in a process of its own, and what both mean."""
+"""One preflight: facts, a measurement in a separate process, findings and verdicts."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from drivers.computer.lateness import Measured, from_json
 from drivers.computer.sockets import hold_name, require_linux
 from drivers.errors import Busy, LinkLost
 
-#: How far the measurement is (0…1) and at which period.
+#: Callback with the progress of the measurement (0…1) and its period [µs].
 Reported = Callable[[float, int], None]
 MOST_S = 60.0
 
 
 @dataclass(frozen=True, slots=True)
 class Preflight:
-    """The result; ``measured`` is by period in µs and empty where nothing was measured."""
+    """Result of a preflight; ``measured`` by period [µs], empty where nothing was measured."""
 
     interface: str
     facts: HostFacts
@@ -34,7 +34,7 @@ class Preflight:
 def judged(
     interface: str, facts: HostFacts, measured: Mapping[int, Measured] | None = None
 ) -> Preflight:
-    """What facts and figures mean."""
+    """Findings and verdicts from facts and measurement."""
     found = findings(facts)
     runs = measured or {}
     return Preflight(interface, facts, found, verdicts(found, runs), runs)
@@ -47,14 +47,16 @@ async def preflight(
     computer: Computer | None = None,
     progress: Reported = lambda _fraction, _period_us: None,
 ) -> Preflight:
-    """Look, and measure for ``seconds`` where that is more than 0; frames go to ``interface``.
+    """Read the facts, and measure for ``seconds`` if above 0; frames are sent to ``interface``.
 
-    Nothing is written to a drive: the frames read register 0000h. Where the facts say that no frame
-    gets through, wake-ups alone are measured.
+    Nothing is written to a drive: the frames read register 0000h. Where the facts show that no
+    frame can be transmitted, only wake-ups are measured.
 
     Raises:
-        NotAllowed: the system is not Linux. OutOfRange: no name of an interface. Busy: an
-        EtherCAT master uses the interface. LinkLost: the measurement failed, with its reason.
+        NotAllowed: the system is not Linux.
+        OutOfRange: not the name of an interface.
+        Busy: an EtherCAT master uses the interface.
+        LinkLost: the measurement failed; the message contains the reason.
     """
     require_linux("the preflight")
     if interface:
@@ -75,7 +77,7 @@ async def preflight(
 
 
 async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
-    """Run the process that measures; it ends with this call, however that ends."""
+    """Run the measuring process, which ends with this call in any case."""
     held = None
     if interface:
         try:

@@ -1,4 +1,4 @@
-"""The words of the preflight in English and Chinese: made from codes and figures, here alone."""
+"""Texts of the preflight in English and Chinese, made from codes and figures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Language = Literal["en", "zh"]
 
 
 class Words(NamedTuple):
-    """What is the case, and what helps."""
+    """Description of a finding, and its remedy."""
 
     what: str
     remedy: str
@@ -28,17 +28,17 @@ def words(one: Finding, language: Language = "en") -> Words:
 
 
 def purpose_name(purpose: Purpose, language: Language = "en") -> str:
-    """What somebody wants to do."""
+    """Name of a purpose."""
     return _PURPOSES[language][purpose]
 
 
 def fix_name(fix: Fix, language: Language = "en") -> str:
-    """What a press changes."""
+    """Name of a fix."""
     return _FIXES[language][fix]
 
 
 def verdict_words(one: Verdict, language: Language = "en") -> str:
-    """A verdict with its figures."""
+    """A verdict with its figures, as text."""
     grade = _GRADES[language][one.grade]
     texts = _REASONS[language]
     if one.blocked_by is not None:

@@ -1,10 +1,11 @@
-"""What was measured means for a purpose: a typed verdict with the figures that it rests on.
+"""Verdicts on the computer's suitability for a purpose, with the figures they are based on.
 
-A cycle is missed where waking up and the frame's way together take longer than the cycle: then the
-drives hold the setpoint of the cycle before, and a sample is missing. Held setpoints are an error
-of the excitation: with a share ``f`` of them and a signal at a tenth of the sampling rate, whose
-step from sample to sample is at most 2·sin(π/10) = 0.62 of its amplitude, the rms error is at most
-0.62·√f of it; f = 0.001 is 2 % or 0.17 dB, within the accuracy that responses state.
+A cycle is missed where wake-up and transmission of the frame together take longer than the cycle:
+the drives then hold the setpoint of the cycle before, and a sample is missing. Held setpoints are
+an error of the excitation. With a share ``f`` of them and a signal at a tenth of the sampling
+rate, whose step from sample to sample is at most 2·sin(π/10) = 0.62 of its amplitude, the rms error
+is at most 0.62·√f of the amplitude; f = 0.001 results in 2 % or 0.17 dB, within the stated accuracy
+of responses.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from drivers.computer.lateness import Measured, missed_bound
 
 
 class Purpose(StrEnum):
-    """What somebody wants to do, and at which cycle."""
+    """Purpose for which the computer is judged, with its cycle."""
 
     PARAMETERS = "parameters"
     SCOPE_1_KHZ = "scope_1khz"
@@ -27,7 +28,7 @@ class Purpose(StrEnum):
 
 
 class Grade(StrEnum):
-    """``not_measured``: without a measurement nothing is stated of timing."""
+    """Suitability for a purpose; ``not_measured``: timing is not known without a measurement."""
 
     SUITABLE = "suitable"
     LIMITED = "limited"
@@ -37,8 +38,10 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """``missed_bound`` is the share of missed cycles that is not exceeded with 95 % confidence;
-    ``allowed`` the largest with which the purpose is suitable. None where timing plays no part.
+    """Verdict on one purpose.
+
+    ``missed_bound``: share of missed cycles that is not exceeded with 95 % confidence; ``allowed``:
+    largest share with which the computer is suitable. None where timing does not matter.
     """
 
     purpose: Purpose
@@ -54,8 +57,8 @@ PERIODS_US = {
     Purpose.RESPONSE_1_KHZ: 1000,
     Purpose.RESPONSE_4_KHZ: 250,
 }
-#: Suitable up to the first, of limited use up to the second. A scope counts what is missing and
-#: shows it; a response needs what its docstring above derives.
+#: Share of missed cycles up to which the grade is suitable, and up to which it is limited. A scope
+#: counts and shows missing samples; for responses the module's docstring derives the limit.
 _SHARES = {
     Purpose.SCOPE_1_KHZ: (0.01, 0.1),
     Purpose.RESPONSE_1_KHZ: (0.001, 0.01),
@@ -64,7 +67,7 @@ _SHARES = {
 
 
 def verdicts(found: Sequence[Finding], measured: Mapping[int, Measured]) -> list[Verdict]:
-    """One for each purpose. ``measured`` is by its period in µs."""
+    """One verdict for each purpose. ``measured``: by period [µs]."""
     blocked = next((one.code for one in found if one.effect is Effect.BLOCKS), None)
     return [_verdict(purpose, blocked, measured) for purpose in Purpose]
 

@@ -1,1 +1,1 @@
-"""Recordings as files: written without loss through crashes and full disks, read, exported."""
+"""Recordings as files that stay readable after crashes and full disks: writing, reading, export."""

@@ -1,4 +1,4 @@
-"""Support bundles: a zip with everything about a moment, and a page to read it by."""
+"""Support bundles: a zip with all data about one moment, and an HTML page that shows them."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from drivers.computer.processes import yield_processor
 
 
 async def build_apart(evidence: Evidence, target: Path) -> None:
-    """`build` where it disturbs nobody: in a process of its own where there are cyclic samples.
+    """`build` without blocking the server: in a separate process where there are cyclic samples.
 
     Raises:
-        StorageFailed: the disk does not take it.
+        StorageFailed: the bundle cannot be written.
     """
     if not evidence.blocks:
         await asyncio.to_thread(build, evidence, target)
@@ -55,10 +55,10 @@ async def build_apart(evidence: Evidence, target: Path) -> None:
 
 
 def build(evidence: Evidence, target: Path) -> None:
-    """Write the zip; it appears when it is whole. Blocking.
+    """Write the zip; it gets its name only when it is complete. Blocking.
 
     Raises:
-        StorageFailed: the disk does not take it.
+        StorageFailed: the bundle cannot be written.
     """
     try:
         _build(evidence, target)
@@ -126,7 +126,7 @@ def _recording(evidence: Evidence) -> bytes:
 
 
 def json_header(header: dict[str, Any]) -> bytes:
-    """The header chunk; dates and the like become text."""
+    """The header chunk; values that JSON has no type for, such as dates, become text."""
     plain = json.loads(json.dumps(header, default=str))
     return chunks.json_chunk(chunks.HEADER, plain)
 
@@ -150,7 +150,7 @@ def _history(values: Sequence[Value]) -> str:
 
 
 def main() -> int:
-    """The process of `build_apart`: the evidence comes by standard input."""
+    """The process of `build_apart`; it reads the evidence from standard input."""
     yield_processor(NICE)
     evidence = pickle.load(sys.stdin.buffer)  # noqa: S301 - from the server that started us
     try:

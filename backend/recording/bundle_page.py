@@ -1,4 +1,4 @@
-"""The page by which a support bundle is read, in any browser and without the station."""
+"""The HTML page of a support bundle, for any browser and without the station."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from backend.recording.table import merged
 from backend.work.journal import Entry
 
 PLOT_WIDTH, PLOT_HEIGHT = 900, 120
-#: Fewer points are no curve; more curves are no page any more.
+#: Smallest number of points of a curve, and largest number of curves on the page.
 LEAST_POINTS, MOST_CURVES = 3, 60
 
 
@@ -26,12 +26,12 @@ def when(epoch_s: float) -> str:
 
 
 def log_line(entry: Entry) -> str:
-    """A line of the log."""
+    """An entry of the log as one line of text."""
     return f"{when(entry.time)} {entry.level:<7} {entry.drive or '-':<12} {entry.text}"
 
 
 def page(evidence: Evidence, drawings: str) -> str:
-    """The page; ``drawings`` are those of the cyclic samples, empty without any."""
+    """The page as HTML. ``drawings``: drawings of the cyclic samples, empty without any."""
     parts = [
         f"<h1>{_e(evidence.reason)}</h1>",
         f"<p>{_e(when(evidence.time))} · servodeck {_e(evidence.version)}</p>",
@@ -97,7 +97,7 @@ def _axis(axis: dict[str, Any]) -> str:
 
 
 def _remembered(past: dict[str, Any]) -> str:
-    """The drive's own record of faults, with what it froze at each."""
+    """The drive's own fault history, with the values stored at each fault."""
     if past["why"]:
         return f"<p>Faults that the drive remembers: {_e(past['why'])}.</p>"
     rows = "".join(
@@ -128,7 +128,7 @@ def _e(value: object) -> str:
 
 
 def drawings_of(reader: RecordingReader, evidence: Evidence) -> str:
-    """One curve for each channel, drawn by its least and greatest value in each column."""
+    """One curve for each channel, drawn by its minimum and maximum in each pixel column."""
     parts = list(merged(reader))
     if not parts:
         return ""
@@ -145,7 +145,7 @@ def drawings_of(reader: RecordingReader, evidence: Evidence) -> str:
 
 
 def _polled(evidence: Evidence) -> str:
-    """Curves of what was read one by one and changed, but for what every cycle brought."""
+    """Curves of polled values that changed, without the signals of the cyclic exchange."""
     cyclic = {(c["drive"], c["key"]) for s in evidence.streams for c in s["channels"]}
     found: dict[tuple[str, str], list[tuple[float, float]]] = {}
     for value in evidence.history:
@@ -170,7 +170,7 @@ def _polled(evidence: Evidence) -> str:
 
 
 def curve(times: npt.NDArray[np.float64], values: npt.NDArray[np.float64], mark_s: float) -> str:
-    """An SVG of one channel, with a line at ``mark_s``; no peak is lost to the drawing."""
+    """An SVG of one channel, with a line at ``mark_s``; the drawing contains every peak."""
     good = np.isfinite(values)
     times, values = times[good], values[good]
     if not len(times):

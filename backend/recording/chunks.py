@@ -1,6 +1,6 @@
-"""The file format of recordings (``.sdrec``): bytes <-> values, pure.
+"""The file format of recordings (``.sdrec``): conversion between bytes and values, without I/O.
 
-A file is the magic ``SDREC\\x01\\r\\n`` and then chunks, only ever appended. A chunk is
+A file is the magic ``SDREC\\x01\\r\\n`` followed by chunks, which are only appended. A chunk is
 
 ====== ====== ==============================================================
 offset bytes  meaning (little endian)
@@ -13,9 +13,9 @@ offset bytes  meaning (little endian)
 16     n      payload
 ====== ====== ==============================================================
 
-The first chunk is the header. A file that was cut anywhere is good up to its last whole chunk.
-A file that was closed in order ends with an end chunk and 16 bytes: ``SDRECEND`` and the offset
-of the end chunk, so that its summary is found without reading the samples.
+The first chunk is the header. A truncated file is valid up to its last complete chunk. A file that
+was closed ends with an end chunk and 16 bytes: ``SDRECEND`` and the offset of the end chunk, so
+that its summary is found without reading the samples.
 docs/recording.md describes the same for users.
 """
 
@@ -39,13 +39,13 @@ TRAILER = struct.Struct("<8sQ")
 TRAILER_MAGIC = b"SDRECEND"
 FRAME = struct.Struct("<4sB3xII")
 _MARKER = b"CHNK"
-#: What the CRC covers before the payload: kind and length.
+#: Part that the CRC covers before the payload: kind and length.
 _CHECKED = struct.Struct("<B3xI")
 #: stream, rows, columns, flags, sequence, lost samples before this block, t0, dt
 BLOCK = struct.Struct("<HHIIIIdd")
 _TIMES, _VALID = 1, 2
 Part = bytes | memoryview
-#: No chunk is larger; a length beyond it is damage, not data.
+#: Largest payload of a chunk; a greater length indicates damage.
 MAX_PAYLOAD = 1 << 28
 
 
@@ -61,7 +61,7 @@ def json_chunk(kind: int, content: Mapping[str, object]) -> bytes:
 
 
 def frame_head(data: bytes) -> tuple[int, int, int] | None:
-    """Kind, length and CRC of a chunk's first 16 bytes; None where there is no chunk."""
+    """Kind, length and CRC from a chunk's first 16 bytes; None where there is no chunk."""
     if len(data) < FRAME.size:
         return None
     marker, kind, length, crc = FRAME.unpack(data[: FRAME.size])
@@ -78,7 +78,10 @@ def intact(kind: int, payload: bytes, crc: int) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """One block of one stream. ``times_s`` [n] on the clock of the recording's ``clock``."""
+    """One block of one stream: ``values`` [n, k], ``valid`` [n].
+
+    ``times_s`` [n]: sample times on the recording's sample clock (`Clock.sample_s`).
+    """
 
     stream: int
     sequence: int
@@ -89,12 +92,12 @@ class Samples:
 
 
 def samples_chunk(stream: int, block: ScopeBlock) -> bytes:
-    """A block as a chunk; every value is kept as the 64-bit number that it is."""
+    """A block as a chunk; every value keeps its 64 bits."""
     return b"".join(samples_parts(stream, block))
 
 
 def samples_parts(stream: int, block: ScopeBlock) -> list[Part]:
-    """The same in pieces, without a copy of the samples: one after the other they are the chunk."""
+    """The parts that make up the chunk of a block, in order, without a copy of the samples."""
     rows, columns = block.samples.shape
     flags = (_TIMES if block.times_s is not None else 0) | (
         _VALID if block.valid is not None else 0
@@ -124,7 +127,7 @@ def _raw(array: npt.NDArray[np.float64] | npt.NDArray[np.uint8]) -> memoryview:
 
 @dataclass(frozen=True, slots=True)
 class BlockHead:
-    """What a samples chunk says before its arrays."""
+    """The fixed part of a samples chunk, before its arrays."""
 
     stream: int
     rows: int

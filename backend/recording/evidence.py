@@ -1,4 +1,4 @@
-"""What is known about a moment: everything that goes into a support bundle."""
+"""The data of a support bundle."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.link import ScopeBlock
 
 @dataclass(frozen=True, slots=True)
 class Value:
-    """One reading of the history; ``time`` in epoch seconds."""
+    """One reading of the history; ``time`` in seconds since 1970."""
 
     time: float
     drive: str
@@ -22,7 +22,7 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """What goes into a bundle. ``axes``: identity, state and parameters of each."""
+    """Contents of a bundle. ``axes``: identity, state, parameters and past faults of each."""
 
     reason: str
     time: float
@@ -35,6 +35,6 @@ class Evidence:
     blocks: Sequence[tuple[int, ScopeBlock]]
     clock: dict[str, float]
     frames: Mapping[str, bytes] = field(default_factory=dict)
-    """pcapng files of the opened buses, by the names they get in the bundle."""
+    """pcapng files of the opened buses, by their file names in the bundle."""
     names: Mapping[tuple[str, str], str] = field(default_factory=dict)
-    """What the values of the history are, by drive and key, with their units."""
+    """Names of the values of the history with their units, by drive and key."""

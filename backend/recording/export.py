@@ -1,9 +1,9 @@
-"""Exports of a recording: CSV, rerun's .rrd, MCAP. Run as a process of its own.
+"""Exports of a recording: CSV, rerun's .rrd, MCAP. Run as a separate process.
 
     python -m backend.recording.export FILE.sdrec OUT (csv|csv_raw|rrd|mcap)
 
-Prints the fraction done, a line at a time. ``csv`` and ``rrd`` are in the units that the scope
-shows; in ``csv_raw`` and ``mcap`` every value is the number that was recorded. Times are exact to a
+Prints the completed fraction, one number a line. ``csv`` and ``rrd`` are in the units that the
+scope shows; ``csv_raw`` and ``mcap`` contain the values as recorded. Times are exact to a
 nanosecond.
 """
 
@@ -25,16 +25,17 @@ from backend.recording.table import merged
 from backend.store.spreadsheet import as_text
 from drivers.computer.processes import yield_processor
 
-#: The process writes text for seconds; the bus and the pages go first.
+#: Nice value of the process, which runs for seconds; the buses and the pages have priority.
 NICE = 10
 Progress = Callable[[float], None]
 
 
 def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
-    """Write ``target``; it appears only when it is whole.
+    """Write ``target``; it gets its name only when it is complete.
 
     Raises:
-        NotAllowed, BadRecording: the source cannot be read. OSError: the target not written.
+        NotAllowed, BadRecording: the source cannot be read.
+        OSError: the target cannot be written.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f".{target.name}.part")
@@ -49,14 +50,14 @@ def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """Title of a channel with its unit, and the factor from what was recorded to that unit."""
+    """Title of a channel with its unit, and the factor from the recorded unit to it."""
 
     title: str
     factor: float
 
 
 def shown(channels: Sequence[Channel]) -> list[Column]:
-    """In the units that the scope shows."""
+    """Columns in the units that the scope shows."""
     return [Column(_title(c.name, c.shown_unit), c.shown_factor) for c in channels]
 
 
@@ -65,25 +66,25 @@ def _title(name: str, unit: str) -> str:
 
 
 def to_csv(reader: RecordingReader, path: Path, progress: Progress) -> None:
-    """In the units that the scope shows; see `_write_csv`."""
+    """Write a CSV file in the units that the scope shows; see `_write_csv`."""
     _write_csv(reader, path, progress, shown(reader.channels))
 
 
 def to_csv_raw(reader: RecordingReader, path: Path, progress: Progress) -> None:
-    """Every number as it was recorded, in the drive's own units; see `_write_csv`."""
+    """Write a CSV file with the values as recorded, in the drive's own units; see `_write_csv`."""
     columns = [Column(_title(c.name, c.unit), 1.0) for c in reader.channels]
     _write_csv(reader, path, progress, columns)
 
 
 def _cell(value: float, factor: float) -> str:
-    """A recorded value to the last bit; a converted one without the dust of its product."""
+    """A recorded value exactly; a converted one with 15 digits, to hide rounding of the product."""
     return repr(value) if factor == 1.0 else f"{value * factor:.15g}"
 
 
 def _write_csv(
     reader: RecordingReader, path: Path, progress: Progress, columns: Sequence[Column]
 ) -> None:
-    """One row for each time at which anything was sampled; empty where a channel was not."""
+    """Write one row for each sample time; a cell is empty where its channel has no sample."""
     factors = [column.factor for column in columns]
     summary = reader.summary()
     duration = max(summary.duration_s, 1e-9)
@@ -112,14 +113,14 @@ def _write_csv(
 def epoch_ns(
     reader: RecordingReader, times_s: np.ndarray[tuple[int], np.dtype[np.float64]]
 ) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Nanoseconds since the epoch; a float of today's epoch holds no better than 240 ns."""
+    """Times in ns since 1970 as integers; a float of this size only resolves 240 ns."""
     start = round(reader.clock.epoch_s * 1e9)
     since = np.rint((times_s - reader.clock.sample_s) * 1e9).astype(np.int64)
     return np.asarray(since + start, dtype=np.int64)
 
 
 def to_mcap(reader: RecordingReader, path: Path, progress: Progress) -> None:
-    """One topic for each stream, one JSON message for each row of it."""
+    """Write an MCAP file: one topic for each stream, with one JSON message for each sample time."""
     from mcap.writer import Writer
 
     total = max(1, reader.summary().samples)
@@ -167,7 +168,7 @@ def to_mcap(reader: RecordingReader, path: Path, progress: Progress) -> None:
 
 
 def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
-    """One entity for each drive and unit, the events as a text log, and the arrangement."""
+    """Write a .rrd file: one entity for each drive and unit, a text log of events, the layout."""
     import rerun as rr
 
     from backend.recording import rerun_layout
@@ -195,7 +196,7 @@ def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
 
 
 def main() -> int:
-    """The process."""
+    """The process of an export."""
     yield_processor(NICE)
     source, target, kind = sys.argv[1:4]
     last = -1.0

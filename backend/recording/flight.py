@@ -12,12 +12,12 @@ SUFFIX = ".pcapng"
 
 
 def file_name(url: str) -> str:
-    """A file name for a bus: of its URL what file names may have."""
+    """File name for a bus: the letters and digits of its URL."""
     return (re.sub(r"[^A-Za-z0-9]+", "-", url).strip("-")[:60] or "bus") + SUFFIX
 
 
 async def flights(opened: Mapping[str, Link]) -> dict[str, bytes]:
-    """A pcapng file of each bus that records; a bus that cannot give one is left out."""
+    """A pcapng file of each bus that records its frames; a bus that fails is left out."""
     found: dict[str, bytes] = {}
     for url, link in list(opened.items()):
         if link.frames is None:

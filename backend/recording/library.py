@@ -1,4 +1,4 @@
-"""The folder of recordings: list, search, describe, delete, and keep within bounds."""
+"""The folder of recordings: listing, search, remarks, deletion and retention."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXPORTS = {"csv": ".csv", "csv_raw": ".raw.csv", "rrd": ".rrd", "mcap": ".mcap"}
 
 @dataclass(frozen=True, slots=True)
 class Remarks:
-    """What people write about a recording afterwards. ``kept`` protects it from retention."""
+    """Remarks of people on a recording. ``kept`` protects it from retention."""
 
     notes: str = ""
     tags: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class Remarks:
 
 @dataclass(frozen=True, slots=True)
 class Retention:
-    """Bounds of the folder; None means none. Recordings marked ``kept`` are never deleted."""
+    """Limits of the folder; None for no limit. Recordings marked ``kept`` are not deleted."""
 
     max_total_bytes: int | None = 20_000_000_000
     keep_days: float | None = None
@@ -38,7 +38,7 @@ class Retention:
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """One recording of the list. ``summary`` is None where the file is no usable recording."""
+    """One recording in the list. ``summary`` is None where the file is not usable."""
 
     name: str
     summary: Summary | None
@@ -49,7 +49,7 @@ class Stored:
     problem: Text | None = None
 
     def words(self) -> str:
-        """Everything that a search looks through, in lower case."""
+        """All text that a search covers, in lower case."""
         parts = [self.name, self.remarks.notes, *self.remarks.tags]
         if self.summary is not None:
             header = self.summary.header
@@ -72,7 +72,7 @@ class RecordingLibrary:
     # --- names ------------------------------------------------------------------------
 
     def path(self, name: str) -> Path:
-        """Where a recording of this name lies.
+        """Path of a recording of this name.
 
         Raises:
             NotAllowed: it is not a plain file name.
@@ -91,7 +91,7 @@ class RecordingLibrary:
         return path
 
     def free_name(self, wanted: str) -> str:
-        """``wanted``, or with a number behind it where that exists."""
+        """File name from ``wanted``, with a number appended where it exists already."""
         stem = checked_name(wanted, SUFFIX).removesuffix(SUFFIX)
         name, number = stem, 2
         while (self.folder / (name + SUFFIX)).exists():
@@ -99,7 +99,7 @@ class RecordingLibrary:
         return name + SUFFIX
 
     def export_path(self, name: str, kind: str) -> Path:
-        """Where the export of a recording lies or will lie.
+        """Path of an export of a recording, whether it exists or not.
 
         Raises:
             NotAllowed: no such kind.
@@ -114,7 +114,7 @@ class RecordingLibrary:
     def entries(self, search: str = "", busy: Iterable[str] = ()) -> list[Stored]:
         """Recordings that contain every word of ``search``, newest first, without ``busy`` ones.
 
-        Reads the files that changed since the last time; blocking.
+        Reads the files that changed since the last call; blocking.
         """
         words = search.lower().split()
         skip = set(busy)
@@ -159,7 +159,7 @@ class RecordingLibrary:
     def annotate(
         self, name: str, *, notes: str | None, tags: tuple[str, ...] | None, kept: bool | None
     ) -> Stored:
-        """Change what is written about a recording; None leaves a thing as it is."""
+        """Change the remarks on a recording; None leaves a field unchanged."""
         path = self.existing(name)
         remarks = self._remarks(path)
         remarks = replace(
@@ -186,13 +186,13 @@ class RecordingLibrary:
         self._seen.pop(path.name, None)
 
     def set_retention(self, retention: Retention) -> None:
-        """Keep these bounds from now on."""
+        """Store and apply these limits."""
         text = json.dumps(asdict(retention))
         write_atomically(self.folder / "retention.json", text.encode())
         self.retention = retention
 
     def prune(self, busy: Iterable[str] = (), now: float | None = None) -> list[str]:
-        """Delete what retention asks for, oldest first; returns the names. Blocking."""
+        """Delete recordings beyond the limits, oldest first; return their names. Blocking."""
         now = time.time() if now is None else now
         skip = set(busy)
         rows = []
@@ -237,7 +237,7 @@ class RecordingLibrary:
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    """Contents of a small file of ours; one that is damaged counts as empty."""
+    """Contents of a small JSON file; a missing or damaged one counts as empty."""
     try:
         content = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError):

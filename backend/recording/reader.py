@@ -1,4 +1,4 @@
-"""Reads recordings, whole ones and those that a crash or a full disk cut short."""
+"""Reading recordings, complete ones and those truncated by a crash or a full disk."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from drivers.texts.message import Text, text
 
 
 class BadRecording(NotAllowed):
-    """A file that is no recording, or whose beginning is damaged."""
+    """A file is not a recording, or its beginning is damaged."""
 
     kind = "bad-recording"
 
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One recorded signal. ``name`` is unique in the recording; ``column`` in its stream.
+    """One recorded signal. ``name`` is unique in the recording; ``column`` is that of its stream.
 
-    Samples are in ``unit``, and times ``shown_factor`` in ``shown_unit``, as the scope shows them.
+    Samples are in ``unit``; multiplied by ``shown_factor`` they are in ``shown_unit``, the unit of
+    the scope.
     """
 
     stream: int
@@ -42,19 +43,19 @@ class Channel:
 
 @dataclass(frozen=True, slots=True)
 class Clock:
-    """The same moment on the clock of the samples and in seconds since the epoch."""
+    """One instant on the clock of the samples, and in seconds since 1970."""
 
     sample_s: float
     epoch_s: float
 
     def epoch(self, t_s: float) -> float:
-        """Seconds since the epoch of a sample time."""
+        """A sample time in seconds since 1970."""
         return self.epoch_s + (t_s - self.sample_s)
 
 
 @dataclass(frozen=True, slots=True)
 class BlockRef:
-    """Where a block of samples lies in the file."""
+    """Position of a block of samples in the file, and the time that it covers [s]."""
 
     offset: int
     stream: int
@@ -65,7 +66,7 @@ class BlockRef:
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a recording is. ``state``: ``interrupted`` has no end chunk (crash, full disk)."""
+    """Summary of a recording. ``state``: ``interrupted`` without end chunk (crash, full disk)."""
 
     header: dict[str, Any]
     clock: Clock
@@ -81,7 +82,7 @@ class Summary:
 
     @property
     def duration_s(self) -> float:
-        """From the first to the last sample."""
+        """Time from the first to the last sample [s]."""
         if self.first_s is None or self.last_s is None:
             return 0.0
         return self.last_s - self.first_s
@@ -97,10 +98,11 @@ class _Scan:
 
 
 class RecordingReader:
-    """An open recording. Use it in ``with``.
+    """An open recording, used as a context manager.
 
     Raises:
-        BadRecording: the file is none, or its header is not whole. NotAllowed: no such file.
+        BadRecording: the file is not a recording, or its header is not complete.
+        NotAllowed: no such file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -137,7 +139,7 @@ class RecordingReader:
         return content
 
     def _chunk(self) -> tuple[int, bytes] | None:
-        """The next chunk, or None where the good part of the file ends."""
+        """The next chunk, or None where the intact part of the file ends."""
         head = chunks.frame_head(self._file.read(chunks.FRAME.size))
         if head is None:
             return None
@@ -148,7 +150,7 @@ class RecordingReader:
         return kind, payload
 
     def chunks(self) -> Iterator[tuple[int, bytes]]:
-        """Kind and payload of all whole chunks after the header, in the order of writing."""
+        """Kind and payload of all complete chunks after the header, in the order of writing."""
         self._file.seek(self._begin)
         while (chunk := self._chunk()) is not None:
             position = self._file.tell()
@@ -162,7 +164,11 @@ class RecordingReader:
                 yield chunks.read_samples(payload)
 
     def block(self, ref: BlockRef) -> Samples:
-        """One block."""
+        """Read one block of samples.
+
+        Raises:
+            BadRecording: the file has changed since it was indexed.
+        """
         self._file.seek(ref.offset)
         chunk = self._chunk()
         if chunk is None:
@@ -174,7 +180,7 @@ class RecordingReader:
         return [json.loads(p) for kind, p in self.chunks() if kind == chunks.EVENT]
 
     def index(self) -> list[BlockRef]:
-        """Where each block lies and which time it covers."""
+        """Position and time range of each block."""
         return self._scan().refs
 
     def _scan(self) -> _Scan:
@@ -215,7 +221,7 @@ class RecordingReader:
         return content
 
     def summary(self) -> Summary:
-        """What it holds; of an interrupted file the samples are counted."""
+        """Summary of the recording; for an interrupted file the samples are counted."""
         end = self._end()
         scan = None if end is not None else self._scan()
         facts: dict[str, Any] = end or {"reason": "interrupted"} | sentence(
@@ -252,7 +258,7 @@ def _channels(header: dict[str, Any]) -> tuple[Channel, ...]:
             key=str(channel["key"]),
             name=str(channel["name"]),
             unit=str(channel["unit"]),
-            # Recordings of earlier versions do not say it.
+            # Recordings of earlier versions do not contain it.
             shown_unit=str(channel.get("shown_unit", channel["unit"])),
             shown_factor=float(channel.get("shown_factor", 1.0)),
             synchronous=bool(stream["synchronous"]),

@@ -1,7 +1,7 @@
-"""rerun's own viewer, taken once out of the installed SDK, compressed, into a cache.
+"""rerun's own viewer, taken once from the installed SDK and stored compressed in a cache.
 
-No package of the viewer matches the SDK's version, so it comes from the SDK's command line,
-which serves it on the loopback. Source: docs of rerun-sdk 0.41, ``rerun --serve-web``.
+No package of the viewer matches the SDK's version, so it is fetched from the SDK's command line,
+which serves it on the loopback interface. Source: docs of rerun-sdk 0.41, ``rerun --serve-web``.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from drivers.computer.files import program_name
 from drivers.errors import NotAllowed
 
 FILES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}
-#: The command line starts in about a second; a busy machine takes longer.
+#: Time limit for the start of the command line [s]; it takes about a second, more when busy.
 START_S = 30.0
 
 
 class ViewerAssets:
-    """The viewer's files of the installed version. ``folder`` None: the user's cache."""
+    """Viewer files of the installed version. ``folder``: None for the user's cache."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.version = version("rerun-sdk")
@@ -38,7 +38,7 @@ class ViewerAssets:
         self._lock = asyncio.Lock()
 
     async def file(self, name: str) -> Path:
-        """The gzipped file; takes all of them out of the SDK on first use.
+        """Path of a gzipped file; at first use all files are fetched from the SDK.
 
         Raises:
             NotAllowed: no such file, or the SDK's command line does not run here.
@@ -52,17 +52,17 @@ class ViewerAssets:
         return path
 
     def size(self, name: str) -> int:
-        """Uncompressed length of a file that is there (its last 4 bytes, RFC 1952 clause 2.3.1)."""
+        """Uncompressed length of an existing file (its last 4 bytes, RFC 1952 clause 2.3.1)."""
         with (self.folder / f"{name}.gz").open("rb") as file:
             file.seek(-4, os.SEEK_END)
             return int.from_bytes(file.read(4), "little")
 
 
 def extract(folder: Path) -> None:
-    """Run the command line, take the files, compress them. Blocking.
+    """Run the command line, fetch the files and compress them. Blocking.
 
     Raises:
-        NotAllowed: it does not start or does not serve them; the message has its last words.
+        NotAllowed: it does not start or does not serve the files; the message contains the problem.
     """
     spec = find_spec("rerun_cli")
     if spec is None or not spec.submodule_search_locations:
@@ -70,7 +70,7 @@ def extract(folder: Path) -> None:
     program = Path(spec.submodule_search_locations[0]) / program_name("rerun")
     with tempfile.TemporaryDirectory() as home:
         web, data = free_port(), free_port()
-        # A home of its own: no settings are read or written and no usage data sent.
+        # A temporary home folder: no settings are read or written, and no usage data are sent.
         env = os.environ | {"HOME": home, "XDG_CONFIG_HOME": home, "APPDATA": home}
         process = subprocess.Popen(
             [str(program), "--serve-web", "--web-viewer-port", str(web), "--port", str(data),
@@ -91,7 +91,7 @@ def extract(folder: Path) -> None:
 
 
 def free_port() -> int:
-    """A port of the loopback that nothing uses now."""
+    """A TCP port of the loopback interface that is free now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])

@@ -1,4 +1,4 @@
-"""How signals are arranged in rerun: one entity with several series for each plot.
+"""Layout of signals in rerun: one entity with several series for each plot.
 
 One multi-scalar entity per drive and unit costs a quarter of one entity per channel
 (measured at 16 channels × 4 kHz).
@@ -26,7 +26,7 @@ EVENTS = "events"
 class Plot:
     """One entity: channels of one stream that are shown in the same unit.
 
-    ``columns`` are of the stream, and times ``factors`` in that unit.
+    ``columns``: columns of the stream; multiplied by ``factors`` they are in that unit.
     """
 
     entity: str
@@ -71,7 +71,7 @@ def _plain(text: str) -> str:
 
 
 def blueprint(arranged: Sequence[Plot], *, follow: bool) -> rrb.Blueprint:
-    """One tab for each drive with its plots among each other, and the events below."""
+    """Blueprint with one tab of plots for each drive, and the events below."""
     drives = dict.fromkeys(plot.drive_name for plot in arranged)
     tabs = [
         rrb.Vertical(
@@ -101,7 +101,7 @@ def blueprint(arranged: Sequence[Plot], *, follow: bool) -> rrb.Blueprint:
 
 
 def send_names(recording: rr.RecordingStream, arranged: Sequence[Plot]) -> None:
-    """The series' names; static."""
+    """Send the names of the series, as static data."""
     for plot in arranged:
         rr.log(
             plot.entity, rr.SeriesLines(names=list(plot.names)), static=True, recording=recording
@@ -114,7 +114,7 @@ def send_samples(
     epoch_ns: npt.NDArray[np.int64],
     values: npt.NDArray[np.float64],
 ) -> None:
-    """A run of samples: ``values`` [n, k] of the plot's own columns, as they were recorded."""
+    """Send samples: ``values`` [n, k] of the plot's own columns, as recorded."""
     shown = values * np.array(plot.factors)
     rr.send_columns(
         plot.entity,
@@ -126,7 +126,7 @@ def send_samples(
 
 
 def send_event(recording: rr.RecordingStream, epoch_ns: int, text: str, level: str) -> None:
-    """One line of the text log."""
+    """Send one line of the text log."""
     rr.send_columns(
         EVENTS,
         indexes=[rr.TimeColumn(TIMELINE, timestamp=np.array([epoch_ns], dtype="datetime64[ns]"))],

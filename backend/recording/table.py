@@ -1,4 +1,4 @@
-"""All streams of a recording merged into rows of equal time, a window at a time."""
+"""All streams of a recording merged into rows of equal time, one time window after the other."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from backend.recording.chunks import Samples
 from backend.recording.reader import BlockRef, RecordingReader
 
 WINDOW_S = 1.0
-#: Samples of one stream with the same nanosecond that still keep rows of their own.
+#: Largest number of samples of one stream in the same nanosecond that keep separate rows.
 _SAME = 16
 
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """``time_ns`` [n] since the first sample; ``values`` [n, k] in the order of the channels.
+    """Rows of one time window.
 
-    ``present`` [n, k] is False where a channel has no sample at this time; ``valid`` [n, s] is
-    1, 0, or -1 for streams without a sample or without a mark.
+    ``time_ns`` [n]: time since the first sample; ``values`` [n, k]: one column for each channel.
+    ``present`` [n, k]: False where a channel has no sample at this time. ``valid`` [n, s]: 1 or 0
+    for each stream; -1 without a sample or a mark.
     """
 
     time_ns: npt.NDArray[np.int64]
@@ -31,7 +32,7 @@ class Rows:
 
 
 def merged(reader: RecordingReader) -> Iterator[Rows]:
-    """Every sample exactly once, in the order of time; memory is bounded by the window."""
+    """All samples in the order of time; memory is bounded by the time window."""
     refs = reader.index()
     if not refs:
         return

@@ -1,4 +1,4 @@
-"""Writes one recording on a thread of its own; its queue never drops, it fails instead."""
+"""Writing one recording on its own thread; a full queue ends the recording, no block is dropped."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from drivers.link import ScopeBlock
 from drivers.texts import limits
 from drivers.texts.answers import sentence
 
-#: Blocks that may wait for the disk. At 16 channels × 4 kHz it holds two minutes.
+#: Size of the blocks that may wait for the disk: two minutes at 16 channels × 4 kHz.
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
-#: What was recorded is on the disk at least this often, so that also a power cut loses no more.
+#: Period of flushes to the disk [s]: a power cut loses no more than this.
 SYNC_S = 0.5
-#: Blocks are gathered for this long, unless so many bytes wait already: waking the thread for each
+#: Blocks are collected for this time [s] or up to this size, as waking the thread for each block
 #: would cost more than writing it.
 GATHER_S, GATHER_BYTES = 0.1, 1024 * 1024
-#: Chunks of one write: each is at most five pieces, and the system takes 1024 (IOV_MAX).
+#: Chunks of one write: each has at most five parts, and the system accepts 1024 (IOV_MAX).
 _WRITE_ITEMS = 200
 
 
@@ -51,10 +51,10 @@ class Written:
 
 
 class RecordingWriter:
-    """One open file. All public methods return at once; the disk is touched by the thread.
+    """One open file. All public methods but `close` return at once; the thread writes.
 
-    ``failed`` is called once, on the writer's thread, when the recording ends by itself: disk
-    full, disk gone, or too slow for the samples. What was written up to there is readable.
+    ``failed`` is called once, on the writer's thread, when the recording ends because of an error:
+    disk full, disk removed, or disk too slow. The data written up to then are readable.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class RecordingWriter:
     # --- called by the event loop -----------------------------------------------------
 
     def put(self, stream: int, block: ScopeBlock) -> None:
-        """Queue a block. After a failure it does nothing; ``failed`` reported it."""
+        """Queue a block. Does nothing after a failure, which ``failed`` has reported."""
         self._add((stream, block), block.samples.nbytes + 64)
 
     def event(self, content: Mapping[str, object]) -> None:
@@ -100,10 +100,10 @@ class RecordingWriter:
         return replace(self._written, queued_bytes=self._queued)
 
     def close(self, end: Mapping[str, object]) -> Written:
-        """Write what is queued and the end chunk; blocks until the disk has it.
+        """Write queued blocks and the end chunk; blocks until they are on the disk.
 
         Raises:
-            StorageFailed: the recording failed before or now.
+            StorageFailed: the recording failed, now or before.
         """
         with self._wake:
             self._closing = self._closing or dict(end)
@@ -132,13 +132,13 @@ class RecordingWriter:
                 self._wake.notify()
 
     def _urgent(self) -> bool:
-        """The thread is not to wait for more."""
+        """Whether the thread must not wait for more blocks."""
         return self._queued >= self._enough or self._closing is not None or self._error is not None
 
     # --- the thread -------------------------------------------------------------------
 
     def _create(self, head: bytes) -> BinaryIO:
-        """With its head or not at all: a server may be killed at any moment."""
+        """Create the file with its head atomically, as the server may be killed at any moment."""
         part = self.path.with_name(f".{self.path.name}.{secrets.token_hex(4)}.part")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -190,7 +190,7 @@ class RecordingWriter:
             self._append_together(items[start : start + _WRITE_ITEMS])
 
     def _append_together(self, items: list[_Item]) -> None:
-        """Whole chunks in one call; of those that a failing disk took, the whole ones count."""
+        """Write several chunks in one call; after an error only completely written ones count."""
         parts: list[chunks.Part] = []
         ends: list[int] = []
         size = 0
@@ -237,7 +237,7 @@ class RecordingWriter:
         os.fsync(self._file.fileno())
 
     def _give_up(self, error: StorageFailed) -> None:
-        """Leave a file that ends with a whole chunk, and an end chunk if there is room for it."""
+        """Truncate the file to its last complete chunk, and add an end chunk where possible."""
         with self._wake:
             self._error = error
             self._queue.clear()
@@ -246,8 +246,8 @@ class RecordingWriter:
             os.lseek(self._file.fileno(), self._good, os.SEEK_SET)
             self._end({"reason": "failed"} | sentence("problem", error.text))
         except OSError:
-            # A full disk takes no end chunk either, and one that is gone takes nothing: the
-            # reader does without, and finds the last whole chunk by itself.
+            # The end chunk does not fit a full disk or reach a removed one; without it the reader
+            # finds the last complete chunk by itself.
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file.fileno(), self._good)
         self._failed(error)
@@ -284,7 +284,7 @@ def end_summary(written: Written) -> dict[str, object]:
 
 
 def _name_once(part: Path, path: Path) -> None:
-    """Give a file its name, which no other may have. FAT has no second names."""
+    """Rename a file without replacing an existing one; FAT has no hard links."""
     try:
         os.link(part, path)
     except FileExistsError:
@@ -298,7 +298,7 @@ def _name_once(part: Path, path: Path) -> None:
 
 
 def _write(file: BinaryIO, data: bytes) -> None:
-    """All of it; an unbuffered write may take only a part."""
+    """Write all data; a single unbuffered write may write only a part."""
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]

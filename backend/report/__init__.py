@@ -1,1 +1,1 @@
-"""The commissioning report of an axis: gathered, composed in a language, and rendered."""
+"""The commissioning report of an axis: collecting facts, composing in a language, rendering."""

@@ -1,4 +1,4 @@
-"""What tuning wrote to a drive, from which value to which, kept over restarts for the report."""
+"""Log of parameter changes by tuning, with values before and after, stored for the report."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _UNSAFE = re.compile(r"[^\w.\-]")
 
 @dataclass(frozen=True)
 class Change:
-    """One write of several parameters; raw values by key. ``what`` is notches, gains and so on."""
+    """One write of several parameters; raw values by key. ``what``: such as notches or gains."""
 
     time: datetime
     what: str
@@ -26,7 +26,7 @@ class Change:
 
 @dataclass(frozen=True)
 class NetChange:
-    """One parameter from its first value to its last."""
+    """First and last raw value of one parameter, with the time of the last change."""
 
     key: str
     before: int
@@ -35,7 +35,7 @@ class NetChange:
 
 
 class ChangeLog:
-    """One text file per drive, a JSON object a line, only ever appended to."""
+    """One text file per drive, with one JSON object a line; lines are only appended."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -44,10 +44,10 @@ class ChangeLog:
         return self.folder / f"{_UNSAFE.sub('_', drive_id)}.jsonl"
 
     def add(self, drive_id: str, change: Change) -> None:
-        """Append; values that stayed are left out.
+        """Append a change, without values that stayed the same.
 
         Raises:
-            StorageFailed: the disk. The drive has the new values nevertheless.
+            StorageFailed: the file cannot be written. The drive has the new values nevertheless.
         """
         keys = [key for key, raw in change.after.items() if change.before.get(key) != raw]
         if not keys:
@@ -68,7 +68,7 @@ class ChangeLog:
             ) from error
 
     def read(self, drive_id: str) -> tuple[Change, ...]:
-        """All changes, oldest first. A line that a crash cut short is left out."""
+        """All changes, oldest first. Incomplete lines, as after a crash, are left out."""
         try:
             lines = self._path(drive_id).read_text("utf-8").splitlines()
         except FileNotFoundError:
@@ -91,7 +91,7 @@ def _parsed(line: str) -> Change | None:
 
 
 def net(changes: Iterable[Change]) -> tuple[NetChange, ...]:
-    """Every parameter from before its first change to after its last, where that differs."""
+    """Net change of every parameter, where its last value differs from its first."""
     first: dict[str, int] = {}
     last: dict[str, tuple[int, datetime]] = {}
     for change in changes:

@@ -1,4 +1,4 @@
-"""One chapter of a report for one measurement: numbers, plots, and what it was made with."""
+"""One chapter of a report for one measurement: figures, plots, file and settings."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from backend.tools.sweep.result import SweepAnswer
 from backend.tools.sweep.run import TOOL as SWEEP
 from backend.tools.sweep.texts import margins_grid, resonances_grid
 
-#: Reported apart in print and by the colour-blind: dark blue, orange.
+#: Distinguishable in print and for colour-blind readers: dark blue, orange; grey for the demand.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"
 _LEAST_COHERENCE = 0.5
 _BAND = 1.96
 _PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0)
 _TURN = 360.0
-#: A read-out that one of two steps does not have.
+#: Cell for a value that one of two compared steps does not have.
 _ABSENT = "—"
 
 
 def chapter(measured: Measured, words: Words) -> list[Block]:
-    """Everything about one measurement."""
+    """The blocks of one measurement."""
     blocks: list[Block] = [Heading(kind_title(measured.kind, words), 3)]
     view = measured.view
     if isinstance(view, StepAnswer):
@@ -140,7 +140,7 @@ class _Look:
 
 
 def _curve(of: _Look, values: Sequence[float], std: Sequence[float | None]) -> Curve:
-    """Lines drowned in noise are left out, as on the page."""
+    """Curve of a response, without frequencies of low coherence, as on the page."""
     coherence = of.view.coherence
     kept = [v if c >= _LEAST_COHERENCE else None for v, c in zip(values, coherence, strict=True)]
     spread = [None if s is None else _BAND * s for s in std]
@@ -148,7 +148,7 @@ def _curve(of: _Look, values: Sequence[float], std: Sequence[float | None]) -> C
 
 
 def _whole_turns(view: SweepAnswer) -> list[float]:
-    """An unwrapped phase moved by whole turns so that it begins within ±180°."""
+    """The unwrapped phase [deg], shifted by whole turns so that it begins within ±180°."""
     first = sorted(view.phase_deg[: max(1, len(view.phase_deg) // 20)])
     turns = round(first[len(first) // 2] / _TURN)
     return [value - _TURN * turns for value in view.phase_deg]
@@ -192,7 +192,7 @@ def _step(measured: Measured, view: StepAnswer, words: Words) -> list[Block]:
     )
     present = _numbers(view, words)
     past = _numbers(other, words) if other else {}
-    # Either step may have a row that the other one has not, such as a widened window.
+    # Either step may have a row that the other one lacks, such as a widened window.
     names = list(present | past)
     column = [present.get(each, _ABSENT) for each in names]
     earlier_column = [past.get(each, _ABSENT) for each in names] if other else None
@@ -200,7 +200,7 @@ def _step(measured: Measured, view: StepAnswer, words: Words) -> list[Block]:
 
 
 def _numbers(view: StepAnswer, words: Words) -> dict[str, str]:
-    """Read-outs by their names, in the order of the table."""
+    """Characteristic values by their names, in the order of the table."""
     rows: list[tuple[str, str]] = []
     if view.step is not None:
         rows += [

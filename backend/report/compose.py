@@ -1,4 +1,4 @@
-"""From facts to a document in one language."""
+"""Composition of a document in one language from the facts of a report."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
     numbers = view.step or view.move
     settled = numbers is not None and numbers.settling_s is not None
     settling = milliseconds(numbers.settling_s) if numbers and settled else words("not_reached")
-    # Nobody prints how much overshoot a machine can bear: numbers, and no judgement.
+    # The overshoot that a machine tolerates is not known: figures only, without a judgement.
     tone: Tone = "plain" if settled else "warn"
     if view.move is not None:
         peak = significant(view.move.following_peak, view.unit)
@@ -149,14 +149,14 @@ def _warnings(facts: Facts, words: Words) -> list[Block]:
 
 
 def _stale(facts: Facts, words: Words) -> list[Note]:
-    """What was measured before the last change shows nothing of the axis as it is."""
+    """Warnings that measurements from before the last change do not show the present axis."""
     last = facts.last_change
     if last is None:
         return []
     shown = [m for m in facts.measured if _is_loop(m) or isinstance(m.view, StepAnswer)]
     old = [m for m in shown if m.saved < last]
     if not facts.changes and not old:
-        # What was tried and undone needs no proof.
+        # Changes that were all undone need no measurement afterwards.
         return []
     if not any(_is_loop(m) and m.saved >= last for m in shown):
         return [Note(words("warn.unverified"), "warn")]

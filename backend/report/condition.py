@@ -1,4 +1,4 @@
-"""The chapter of the axis' condition: its baseline, and what has changed since."""
+"""The chapter on the axis' condition: its baseline, and changes since."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from backend.tools.measuring.numbers import moment
 
 
 def condition(found: Condition, baseline: Baseline, words: Words) -> list[Block]:
-    """Who signed what and when, then each quantity against it with the next step."""
+    """The baseline with its signature, then each quantity compared with it, with the next step."""
     rows = (
         ("person", baseline.person),
         ("health.when", f"{moment(baseline.signed)} ({words('utc')})"),

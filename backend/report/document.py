@@ -1,4 +1,4 @@
-"""A report as blocks without appearance; `html` and `pdf` give it one."""
+"""A report as blocks without layout; `html` and `pdf` render them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Language = Literal["en", "zh"]
 
 @dataclass(frozen=True)
 class Heading:
-    """``level`` 2 is a chapter, 3 a part of one."""
+    """A heading. ``level``: 2 for a chapter, 3 for a section of it."""
 
     text: str
     level: Literal[2, 3] = 2
@@ -21,7 +21,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class Note:
-    """A paragraph; its tone is also said as text."""
+    """A paragraph; its tone is shown by colour and as text."""
 
     text: str
     tone: Tone = "plain"
@@ -29,7 +29,7 @@ class Note:
 
 @dataclass(frozen=True)
 class Table:
-    """``head`` may be empty. ``right`` shows the columns of numbers."""
+    """A table. ``head`` may be empty. ``right`` marks the right-aligned columns (numbers)."""
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -38,7 +38,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """Plots above each other, kept together, with one sentence below."""
+    """Plots one below the other on one page, with a caption."""
 
     plots: tuple[Plot, ...]
     caption: str
@@ -46,7 +46,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Signatures:
-    """Lines to sign on, kept together; each box has the same small labels."""
+    """Boxes for signatures on one page; each box has the same labelled lines."""
 
     boxes: tuple[str, ...]
     labels: tuple[str, ...]
@@ -57,7 +57,7 @@ Block = Heading | Note | Table | Figure | Signatures
 
 @dataclass(frozen=True)
 class Document:
-    """``footer`` is on every page of a PDF, before the page number."""
+    """A whole report. ``footer`` is on every page of a PDF, before the page number."""
 
     title: str
     subtitle: str

@@ -1,4 +1,4 @@
-"""Everything that a report shows, in any language, before it has a form."""
+"""The contents of a report, independent of language and layout."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.texts.message import Text
 
 @dataclass(frozen=True)
 class Identity:
-    """Who the axis is; None or empty where it is not known."""
+    """Identity of the axis; None or empty where it is not known."""
 
     axis: str
     drive: str
@@ -30,9 +30,10 @@ class Identity:
 
 @dataclass(frozen=True)
 class ChangedSetting:
-    """One parameter before commissioning and after, as text with its unit.
+    """One parameter before and after commissioning, as text with its unit.
 
-    ``now`` is empty where the drive still has it so, else what it has instead.
+    ``now``: the present value where it differs from ``after``; otherwise, or where it was not read,
+    empty.
     """
 
     key: str
@@ -47,8 +48,8 @@ class ChangedSetting:
 class HandedOverFile:
     """A start-up list that was made for the machine's controller.
 
-    ``values`` are key, name and value with unit; ``changed`` those of them that the drive holds
-    otherwise now, with what it holds.
+    ``values``: key, name and value with unit. ``changed``: key, name, value and present value of
+    parameters whose value in the drive differs now.
     """
 
     time: datetime
@@ -63,9 +64,9 @@ class HandedOverFile:
 
 @dataclass(frozen=True)
 class Measured:
-    """A measurement evaluated again. ``earlier`` is the same kind before the first change.
+    """A measurement, evaluated again. ``earlier``: one of the same kind before the first change.
 
-    ``differences`` names what another version of the program concluded otherwise at the time.
+    ``differences``: fields whose stored result, of another version of the program, differs.
     """
 
     file: str
@@ -77,15 +78,15 @@ class Measured:
     view: ToolResult
     earlier: Measured | None = None
     verdict: VerdictInfo | None = None
-    """On a tuned loop, over all frequencies; None where no tuning verified it."""
+    """Verdict on a tuned loop over all frequencies; None where no tuning verified it."""
 
 
 @dataclass(frozen=True)
 class Facts:
-    """``unsaved`` and ``pending`` name parameters; ``trouble`` is what the drive
-    and the station report.
+    """All facts of a report.
 
-    ``last_change`` is None where nothing was changed.
+    ``unsaved``, ``pending``: parameters not saved in the drive, or not in effect yet. ``trouble``:
+    problems reported by drive and station. ``last_change``: None where nothing was changed.
     """
 
     identity: Identity
@@ -103,5 +104,5 @@ class Facts:
     trouble: tuple[Text, ...] = ()
     handed_over: tuple[HandedOverFile, ...] = ()
     condition: Condition | None = None
-    #: Whether the drive was asked; a report of files alone has no data of its settings.
+    #: Whether the drive was read; a report from files alone has no data of its settings.
     live: bool = True

@@ -1,4 +1,4 @@
-"""Collect what a report shows: from the drive as it is now, its changes, and measurements."""
+"""Collection of a report's facts: from the connected drive, its changes, and measurements."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, joined, prose, text
 from profiles.schema import Parameter, Raw
 
-#: The order in which an axis is commissioned, and a report is read.
-#: Kinds of measurements in the order of the report; those of tools that are not named come last.
+#: Kinds of measurements in the order of the report, which is that of commissioning. Tools that are
+#: not named here come last.
 _ORDER = tuple(dict.fromkeys((
     "inertia", "sweep-mechanics", "sweep-speed_loop", "sweep-position_loop", "step-speed",
     "step-move", *(tool.kind for tool in TOOLS),
@@ -32,7 +32,7 @@ _ORDER = tuple(dict.fromkeys((
 
 @dataclass(frozen=True)
 class About:
-    """What a person says of the work; free text."""
+    """Details of the work that a person enters; free text."""
 
     person: str = ""
     machine: str = ""
@@ -40,7 +40,7 @@ class About:
 
 
 def kind_of(head: Head) -> str:
-    """Kind of a measurement as a report distinguishes them: steps of speed are not moves."""
+    """Kind of a measurement in a report, which distinguishes steps of speed from moves."""
     settings = head.meta.get("settings")
     if head.kind == "step" and isinstance(settings, dict):
         return f"step-{settings.get('kind', 'speed')}"
@@ -48,7 +48,7 @@ def kind_of(head: Head) -> str:
 
 
 def belongs(head: Head, drive: Drive) -> bool:
-    """Whether a file was measured on this very drive: by serial number where both show one."""
+    """Whether a file was measured on this drive; by serial number where both have one."""
     identity, found = head.meta.get("identity"), drive.found
     serial = identity.get("serial") if isinstance(identity, dict) else None
     if head.meta.get("profile") != drive.profile.drive:
@@ -59,20 +59,20 @@ def belongs(head: Head, drive: Drive) -> bool:
 
 
 def choose(heads: Mapping[str, Head], changed_first: datetime | None) -> list[tuple[str, str]]:
-    """The newest file of each kind, with the newest from before the first change ("" if none)."""
+    """The newest file of each kind, each with the newest before the first change ("" for none)."""
     chosen = []
     for kind in _ORDER:
         for files in _alike(kind, heads):
             newest = files[-1][1]
             before = [f for saved, f in files if changed_first and saved < changed_first]
-            # Records of a safety function are no measurements before and after tuning.
+            # Records of a safety function are not compared before and after tuning.
             compares = kind != "safety-check" and before and before[-1] != newest
             chosen.append((newest, before[-1] if compares else ""))
     return chosen
 
 
 def _alike(kind: str, heads: Mapping[str, Head]) -> list[list[tuple[datetime, str]]]:
-    """Files of a kind by time; each safety function by itself, as each has a record."""
+    """Files of a kind, sorted by time; grouped by safety function, as each has its own record."""
     groups: dict[str, list[tuple[datetime, str]]] = {}
     for file, head in heads.items():
         if kind_of(head) == kind:
@@ -85,7 +85,7 @@ def _alike(kind: str, heads: Mapping[str, Head]) -> list[list[tuple[datetime, st
 def measured_from(
     store: MeasurementStore, chosen: Iterable[tuple[str, str]]
 ) -> tuple[tuple[Measured, ...], tuple[Text, ...]]:
-    """Chosen files evaluated again, and messages about those that cannot be. Takes seconds.
+    """Evaluate chosen files again; returns messages about those that fail. Takes seconds.
 
     Raises:
         NotAllowed: there is no file of a name.
@@ -108,7 +108,7 @@ def measured_from(
 
 
 def _why(file: str, error: DriveError) -> Text:
-    """What names the file as its value has it in the text already."""
+    """The error's text with the name of the file, which it contains already if it is its value."""
     return error.text if error.value == file else joined((prose(file), error.text), ": ")
 
 
@@ -134,9 +134,9 @@ def _measured(store: MeasurementStore, file: str) -> Measured:
 async def live_facts(
     bench: Bench, connected: ConnectedDrive, changes: Sequence[Change], about: About
 ) -> Facts:
-    """Everything but the measurements; values that were changed are read from the drive now.
+    """All facts but the measurements; parameters that were changed are read from the drive now.
 
-    A drive that does not answer is reported in the report, and fails nothing.
+    A drive that does not answer is mentioned in the report and raises no error.
     """
     drive = connected.drive
     settings, trouble = await _changes(drive, changes)
@@ -207,7 +207,7 @@ async def _changes(
 
 
 def shown(parameter: Parameter, raw: int) -> str:
-    """A raw value in engineering units, or in the manual's words."""
+    """A raw value in engineering units, or with its text in the manual."""
     if raw in parameter.enum:
         return f"{raw}: {parameter.enum[raw]}"
     value = parameter.to_value(raw)
@@ -215,7 +215,7 @@ def shown(parameter: Parameter, raw: int) -> str:
 
 
 async def handed_over_facts(drive: Drive, made: Sequence[HandedOver]) -> tuple[HandedOverFile, ...]:
-    """The newest hand-over of each format; what the drive holds otherwise now is read."""
+    """The newest hand-over of each format, compared with the values in the drive now."""
     newest = {each.format: each for each in made}
     found = []
     for each in sorted(newest.values(), key=lambda one: one.time):
@@ -251,10 +251,10 @@ def _text_of(parameter: Parameter, raw: Raw) -> str:
 
 
 def facts_of_files(heads: Mapping[str, Head], about: About) -> Facts:
-    """What files report of the drive that they were measured on.
+    """Facts of a drive from measurement files alone.
 
     Raises:
-        NotAllowed: they are of different drives.
+        NotAllowed: the files are of different drives.
     """
     identities = {
         (head.drive, str(head.meta.get("profile")), _serial(head)) for head in heads.values()

@@ -1,4 +1,4 @@
-"""The chapter of the hand-over to the machine's controller."""
+"""The chapter on the hand-over to the machine's controller."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from backend.tools.measuring.numbers import moment
 
 
 def handed_over(made: Sequence[HandedOverFile], words: Words) -> list[Block]:
-    """Format, file, hash, person and date of each list, with its values and what changed since."""
+    """Format, file, hash, person and date of each list, with its values and changes since."""
     blocks: list[Block] = [Note(words("handover.lead"))]
     for each in made:
         rows = (

@@ -1,4 +1,4 @@
-"""A report as one HTML page: no scripts, no other files, every text escaped, made for printing."""
+"""A report as one printable HTML page without scripts or other files; all text is escaped."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _block(block: Block, words: Words) -> str:
 def _note(note: Note, words: Words) -> str:
     if note.tone == "plain":
         return f"<p>{escape(note.text)}</p>"
-    # Colour never alone: print may be black and white.
+    # The tone is also text, as the report may be printed in black and white.
     tone = escape(words(f"tone.{note.tone}"))
     return f'<p class="{note.tone}"><strong>{tone}:</strong> {escape(note.text)}</p>'
 
@@ -119,7 +119,7 @@ def _signatures(block: Signatures) -> str:
 
 
 def svg(drawing: Drawing, title: str) -> str:
-    """A drawing as an SVG element with presentation attributes only, which no policy forbids."""
+    """A drawing as an SVG element without styles, which the page's policy would block."""
     shapes = "\n".join(_shape(shape) for shape in drawing.shapes)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{escape(title)}" '

@@ -1,4 +1,4 @@
-"""The verdict on a tuned loop as a table: where it was measured, and where it is predicted."""
+"""The verdict on a tuned loop as a table, for its measured and its predicted band."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from backend.tools.measuring.numbers import NONE, fixed, hertz
 
 
 def bands(verdict: VerdictInfo, words: Words) -> list[Block]:
-    """Margins of each band with their intervals, and how far the verdict reaches."""
+    """Margins of each band with their intervals, and a note on the band that the verdict covers."""
     rows = tuple(
         _row(words(f"verdict.{name}"), band)
         for name, band in (("measured", verdict.measured), ("predicted", verdict.predicted))

@@ -1,8 +1,8 @@
 """A report as a PDF on A4.
 
-Text is set in DejaVu Sans, and what that has no glyphs for, Chinese above all, in Droid Sans
-Fallback (fonts/README.md). The characters that occur are embedded, so that a report looks the same
-everywhere and in many years.
+Text is set in DejaVu Sans; characters that it lacks, above all Chinese, in Droid Sans Fallback
+(fonts/README.md). The characters that occur are embedded, so that a report looks the same on every
+computer and in many years.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _TONES = {
 
 @cache
 def _fonts() -> frozenset[int]:
-    """Register the fonts once; returns the characters that the plain one has."""
+    """Register the fonts once; return the code points of the plain font."""
     fonts = {name: TTFont(name, _FONTS / f"{name}.ttf") for name in (_PLAIN, _BOLD, _WIDE)}
     for font in fonts.values():
         pdfmetrics.registerFont(font)
@@ -68,13 +68,13 @@ def _fonts() -> frozenset[int]:
 
 
 def _runs(text: str) -> list[tuple[bool, str]]:
-    """Stretches that the plain font can set (True) and those that it cannot."""
+    """Parts of a text that the plain font can set (True) or not (False)."""
     known = _fonts()
     return [(has, "".join(part)) for has, part in groupby(text, key=lambda c: ord(c) in known)]
 
 
 def _markup(text: str) -> str:
-    """Escaped text with the right font for each stretch. Control characters are spaces."""
+    """Escaped text with the right font for each part. Control characters become spaces."""
     clean = "".join(c if c.isprintable() and ord(c) < 0x10000 else " " for c in text)
     return "".join(
         escape(part) if has else f'<font name="{_WIDE}">{escape(part)}</font>'
@@ -89,7 +89,7 @@ def _style(size: float = 9.0, *, right: bool = False, **more: Any) -> ParagraphS
         "leading": size * 1.4,
         "textColor": HexColor("#1b242d"),
         "alignment": TA_RIGHT if right else TA_LEFT,
-        # Breaks long words and Chinese, which has no spaces, wherever the line ends.
+        # Breaks long words, and Chinese, which has no spaces, at the end of the line.
         "wordWrap": "CJK",
         "splitLongWords": 1,
     }
@@ -97,7 +97,7 @@ def _style(size: float = 9.0, *, right: bool = False, **more: Any) -> ParagraphS
 
 
 def render_pdf(document: Document) -> bytes:
-    """The file."""
+    """The PDF file."""
     _fonts()
     out = io.BytesIO()
     frame = Frame(_MARGIN, _FOOT + 6 * mm, _INNER, A4[1] - _MARGIN - _FOOT - 6 * mm, 0, 0, 0, 0)
@@ -169,7 +169,7 @@ def _table(table: Table) -> Grid:
     heads = [table.head] if table.head else []
     rows = [[Paragraph(_markup(c), s) for c, s in zip(r, bold, strict=True)] for r in heads]
     rows += [[Paragraph(_markup(c), s) for c, s in zip(r, styles, strict=True)] for r in table.rows]
-    # The column of names takes what the others leave.
+    # The width of the first column depends on the number of columns; the others are equal.
     first = _INNER * (0.3 if count == 2 and not table.head else 0.34 if count < 5 else 0.13)
     rest = (_INNER - first) / (count - 1)
     widths = [first] + [rest] * (count - 1)
@@ -230,7 +230,7 @@ class _Picture(Flowable):
 
 
 def _paint(canvas: Canvas, shape: Shape) -> None:
-    """Drawings count y downwards from the top, pages upwards."""
+    """Paint a shape; y points downwards in drawings and upwards on pages."""
     if isinstance(shape, Label):
         x, y = shape.at
         _write(canvas, x, -y, shape.text, shape.anchor, shape.size, shape.color, bold=shape.bold)
@@ -264,7 +264,7 @@ def _write(
     canvas: Canvas, x: float, y: float, text: str, anchor: str, size: float,
     color: str = "#4a5763", *, bold: bool = False,
 ) -> None:  # fmt: skip
-    """One line of text, each stretch in a font that has its characters."""
+    """Write one line of text, each part in a font that has its characters."""
     font = _BOLD if bold else _PLAIN
     runs = [(font if has else _WIDE, part) for has, part in _runs(text)]
     widths = [pdfmetrics.stringWidth(part, name, size) for name, part in runs]

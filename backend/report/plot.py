@@ -1,4 +1,4 @@
-"""Plots as plain shapes, so that a web page and a PDF draw exactly the same."""
+"""Plots as plain shapes, so that HTML page and PDF show exactly the same."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Curve:
-    """Points [n]; None leaves a gap. ``spread`` is half the width of a 95 % band."""
+    """Points [n]; None makes a gap. ``spread``: half the width of the 95 % band."""
 
     label: str
     color: str
@@ -83,9 +83,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Plot:
-    """Curves over a common axis. ``band`` is where the x values hold; outside is left white.
+    """Curves over a common x axis. ``band``: valid range of x, which is shaded.
 
-    ``steps`` are the y distances between grid lines that may be chosen from.
+    ``steps``: permitted distances of the horizontal grid lines.
     """
 
     title: str
@@ -101,7 +101,7 @@ class Plot:
 
 
 def draw(plot: Plot) -> Drawing:
-    """Lay a plot out."""
+    """Draw a plot as shapes."""
     frame = _Frame(plot)
     shapes: list[Shape] = [*frame.background(), *frame.grid()]
     for curve in plot.curves:
@@ -113,7 +113,7 @@ def draw(plot: Plot) -> Drawing:
 
 
 class _Frame:
-    """The plot's rectangle and its two scales."""
+    """The plot's rectangle and its x and y scales."""
 
     def __init__(self, plot: Plot) -> None:
         self.plot = plot
@@ -150,7 +150,7 @@ class _Frame:
             yield Label((self.left - 6, at + 4), number(value), "end")
 
     def _runs(self, curve: Curve) -> Iterator[list[tuple[float, float, float]]]:
-        """Stretches without a gap, within the x range: x, y and spread."""
+        """Parts of a curve without a gap, within the x range, as x, y and spread."""
         begin, end = self.plot.x_range
         run: list[tuple[float, float, float]] = []
         spreads = curve.spread or [0.0] * len(curve.x)
@@ -193,7 +193,7 @@ class _Frame:
 
 
 def number(value: float) -> str:
-    """A tick's number, with a true minus sign."""
+    """The number of a tick, with a typographic minus sign."""
     return f"{value:.6g}".replace("-", "−")
 
 
@@ -208,7 +208,7 @@ def _x_ticks(plot: Plot) -> list[float]:
 
 
 def _y_ticks(plot: Plot) -> list[float]:
-    """Grid lines over everything that is drawn, at least two."""
+    """Positions of the horizontal grid lines, at least two, that include all curves."""
     if plot.y_range is not None:
         low, high = plot.y_range
     else:
@@ -226,7 +226,7 @@ def _y_ticks(plot: Plot) -> list[float]:
 
 
 def _step(span: float, lines: int, choice: Sequence[float]) -> float:
-    """A round distance that gives about so many lines."""
+    """A round distance of grid lines that gives about ``lines`` of them."""
     wanted = span / lines
     if choice:
         return next((step for step in choice if step >= wanted), choice[-1])

@@ -1,4 +1,4 @@
-"""The folder of reports, and how one is made."""
+"""The folder of reports, and the rendering of a report."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def render(facts: Facts, language: Language, form: Format) -> bytes:
     document = compose(facts, language)
     if form == "html":
         return render_html(document)
-    # Loaded by the first PDF, or by a server behind its start (`backend.commands.serve`).
+    # Imported by the first PDF, or by a server after its start (`backend.commands.serve`).
     from backend.report.pdf import render_pdf
 
     return render_pdf(document)
@@ -43,10 +43,10 @@ class ReportStore:
         return self.folder / checked_name(name, suffix)
 
     def save(self, drive: str, form: Format, data: bytes) -> str:
-        """Write a new file; returns its name.
+        """Write a new file; return its name.
 
         Raises:
-            StorageFailed: the disk.
+            StorageFailed: the file cannot be written.
         """
         axis = _UNSAFE.sub("-", drive).strip("-.")[:40] or "axis"
         stem = f"{datetime.now(UTC):%Y%m%d-%H%M%S}-report-{axis}"

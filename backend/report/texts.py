@@ -1,4 +1,4 @@
-"""Words of the report, English and Chinese."""
+"""Texts of the report, in English and Chinese."""
 
 from __future__ import annotations
 
@@ -208,6 +208,6 @@ class Words:
         self._column = 1 if language == "zh" else 0
 
     def __call__(self, name: str, **values: str) -> str:
-        """A text with its places filled in."""
+        """A text with its placeholders filled in."""
         text = TEXTS[name][self._column]
         return text.format(**values) if values else text

@@ -1,4 +1,4 @@
-"""What a report shows of tools, from the section that each of them makes."""
+"""Blocks of a report for results of tools, from the section that each tool provides."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ _COLORS = ("#1a5c94", "#c2571a")
 
 
 def kind_title(kind: str, words: Words) -> str:
-    """What a kind of measurement is called."""
+    """Title of a kind of measurement."""
     tool = BY_KIND.get(kind)
     return words(f"kind.{kind}") if tool is None else tool.text("title", words.language)
 
 
 def result_of(tool: object, result: dict[str, object]) -> ToolResult:
-    """The result of a tool, by the name that its measurements carry.
+    """The result of a tool, by the kind that its measurements state.
 
     Raises:
-        BadMeasurement: it is not what that tool concludes.
+        BadMeasurement: no such tool, or not a result of that tool.
     """
     known = BY_KIND.get(str(tool))
     if known is None:
@@ -44,10 +44,10 @@ def result_of(tool: object, result: dict[str, object]) -> ToolResult:
 
 
 def verdict_of(kept: object) -> VerdictInfo | None:
-    """The verdict that an automatic tuning left next to its measurement; None where there is none.
+    """The verdict that autotuning stored with its measurement; None where there is none.
 
     Raises:
-        BadMeasurement: it is not what a tuning concludes.
+        BadMeasurement: not a verdict of autotuning.
     """
     if kept is None:
         return None
@@ -83,20 +83,20 @@ def tool_blocks(result: ToolResult, words: Words) -> list[Block]:
 
 
 def grid_table(tool: AnyTool, grid: Grid, words: Words) -> Table:
-    """A table of a tool as text."""
+    """A table of a tool as a table of the report."""
     head, *rows = tool.cells(grid, words.language)
     return Table(head, tuple(rows), (False, *(True,) * (len(head) - 1)))
 
 
 def tool_verdict(kind: str, result: ToolResult, words: Words) -> Note:
-    """The first note of the section, with what was measured."""
+    """The first note of the tool's section, preceded by the title of the measurement."""
     tool = BY_KIND[result.tool]
     first = note_of(tool, tool.report(result.in_language(words.language)).notes[0], words)
     return Note(f"{kind_title(kind, words)}: {first.text}", first.tone)
 
 
 def note_of(tool: AnyTool, note: ToolNote, words: Words) -> Note:
-    """A finding of a tool as text."""
+    """A note of a tool as a note of the report."""
     return Note(tool.text(note.name, words.language, note.values), note.tone)
 
 

@@ -1,1 +1,1 @@
-"""Recordings of other programs as responses: reading the file, units, evaluation, stored form."""
+"""Frequency responses from recordings of other programs: reading, units, evaluation, storing."""

@@ -1,8 +1,8 @@
-"""From a file's bytes to its table: named columns of numbers. Nothing in it is trusted.
+"""Reading a file's table: named columns of numbers. The contents are not trusted.
 
-Text: comma, semicolon, tab or blanks between the columns, decimal point or comma, any lines before
-the table (makers' scopes write several), UTF-8, UTF-16 or Latin-1, and gzip around it. MATLAB: v4
-to v7. A file is refused by its size before it is unpacked in memory.
+Text: columns separated by comma, semicolon, tab, bar or blanks; decimal point or comma; any lines
+before the table (makers' scopes write several); UTF-8, UTF-16 or Latin-1; also compressed by gzip.
+MATLAB: up to v7. A file that is too large is refused before it is unpacked in memory.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from backend.response_import.matlab import read_matlab
 from drivers.texts import limits
 from drivers.texts.message import text as message
 
-#: Bytes as they come, and unpacked; rows and columns of a table.
+#: Limits: bytes of the file, bytes unpacked, rows and columns of a table.
 MAX_FILE_BYTES = 64 << 20
 MAX_UNPACKED_BYTES = 256 << 20
 MAX_ROWS, MAX_COLUMNS = 4_000_000, 256
-#: The table begins within so many lines.
+#: The table must begin within this number of lines.
 _HEAD_LINES = 400
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$")
 _MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "none", "-", "1.#qnan"}
@@ -33,10 +33,11 @@ _MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "no
 
 @dataclass(frozen=True)
 class Table:
-    """``columns`` by number as in the file, ``names`` next to them; NaN where nothing is written.
+    """The table of a file.
 
-    ``first_line`` is the line of the file that holds the first row, 0 where there are no lines.
-    ``facts`` are pairs that stood before the table, such as a sample time.
+    ``columns``: in the order of the file, with ``names``; NaN in empty cells. ``first_line``: line
+    of the file with the first row, 0 for files without lines. ``facts``: pairs of name and value
+    from the lines before the table, such as a sample time.
     """
 
     names: tuple[str, ...]
@@ -52,10 +53,10 @@ class Table:
 
 
 def read_table(data: bytes, name: str) -> Table:
-    """The table of a file.
+    """Read the table of a file.
 
     Raises:
-        BadRecording: no table in it, too large, or a format that is not read.
+        BadRecording: no table in it, too large, or a format that is not supported.
     """
     if len(data) > MAX_FILE_BYTES:
         raise BadRecording(
@@ -72,7 +73,7 @@ def read_table(data: bytes, name: str) -> Table:
 
 
 def _unpacked(data: bytes, name: str) -> bytes:
-    """Without gzip; an end of what is unpacked is set before anything is."""
+    """The data without gzip compression; unpacking stops at the size limit."""
     if data[:2] != b"\x1f\x8b":
         return data
     try:
@@ -125,7 +126,7 @@ def _decoded(data: bytes, name: str) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
-        # Every byte is a letter in Latin-1; degree and micro signs of older programs are.
+        # Latin-1 decodes every byte, also the degree and micro signs of older programs.
         return data.decode("latin-1")
 
 
@@ -158,9 +159,9 @@ class _Layout:
 
 
 def _layout(lines: list[str], name: str) -> _Layout:
-    """Separator and decimal sign by which the most lines are rows of as many numbers.
+    """Separator and decimal sign with which the most consecutive lines are rows of numbers.
 
-    A row begins the table where the following ones have its width, too.
+    Of equal candidates the one with the most columns is taken.
     """
     best: tuple[int, int, _Layout] | None = None
     for separator, comma in (
@@ -185,7 +186,7 @@ def _layout(lines: list[str], name: str) -> _Layout:
 def _longest_run(
     lines: list[str], separator: str | None, comma: bool
 ) -> tuple[int, _Layout] | None:
-    """Rows of numbers of one width, at least half of each filled."""
+    """The longest run of rows of numbers of similar width, each at least half filled."""
     best: tuple[int, _Layout] | None = None
     start, width, count = 0, 0, 0
     for i, line in enumerate(lines):
@@ -196,7 +197,7 @@ def _longest_run(
         missing = sum(c.lower() in _MISSING for c in cells)
         row = bool(cells) and numbers >= 1 and numbers + missing == len(cells)
         row = row and 2 * numbers >= len(cells)
-        # Rows may end in empty cells, where one channel of several has ended.
+        # Rows may end with empty cells, where one of several channels has ended.
         if row and (count == 0 or abs(len(cells) - width) <= width // 2):
             if count == 0:
                 start, width = i, len(cells)
@@ -211,7 +212,7 @@ def _longest_run(
 
 
 def _from_text(text: str, name: str) -> Table:
-    # Only line ends: other characters that Python splits at occur inside units.
+    # Split at line ends only: other characters at which `splitlines` splits occur in units.
     lines = re.split(r"\r\n|\n|\r", text)
     if len(lines) > MAX_ROWS + _HEAD_LINES:
         raise BadRecording(
@@ -271,7 +272,7 @@ def _numbers(rows: list[str], layout: _Layout, name: str) -> tuple[FloatArray, .
 
 
 def _fast(rows: list[str], layout: _Layout) -> FloatArray | None:
-    """Whole regular tables at once; nothing where any row is irregular."""
+    """Parse a whole regular table at once; None where a row is irregular."""
     text = "\n".join(rows)
     if layout.comma:
         text = text.replace(",", ".")
@@ -285,7 +286,7 @@ def _fast(rows: list[str], layout: _Layout) -> FloatArray | None:
 
 
 def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
-    """The last line before the table that names its columns, with units of a line below it."""
+    """Column names from the last lines before the table, with units from a line below them."""
     rows = []
     for line in head:
         cells = _split(
@@ -313,7 +314,7 @@ def _names(head: list[str], layout: _Layout) -> tuple[str, ...]:
 
 
 def _has_names(cells: list[str]) -> bool:
-    """A line of names: words, and not twice the same one throughout."""
+    """Whether a line contains names: mostly words, and not all the same."""
     words = [c for c in cells if re.search(r"[^\W\d]", c)]
     return 2 * len(words) >= len(cells) and len(set(words)) > 1
 

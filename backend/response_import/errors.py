@@ -1,4 +1,4 @@
-"""What is wrong with a recording that somebody brings."""
+"""Error of an imported recording."""
 
 from __future__ import annotations
 
@@ -6,6 +6,6 @@ from drivers.errors import NotAllowed
 
 
 class BadRecording(NotAllowed):
-    """A file of which no response can be made; names column, value and remedy."""
+    """No response can be made from a file; the error has column, value and remedy."""
 
     kind = "bad-recording"

@@ -1,4 +1,4 @@
-"""From a table and what somebody says of it to the answer that a sweep has."""
+"""Evaluation of an imported table with a person's settings, in the JSON form of a sweep."""
 
 from __future__ import annotations
 
@@ -31,21 +31,22 @@ from drivers.texts.answers import sentences
 from drivers.texts.message import Text, text
 
 Structure = Literal["unknown", "motor_speed", "load_speed", "speed_loop"]
-#: Between where a load counts as compliant, medium and stiff, as for measurements of our own.
+#: Limits between a compliant, medium and stiff load [Hz], as for servodeck's own measurements.
 _COMPLIANT_HZ, _MEDIUM_HZ = 80.0, 300.0
 _CLIPPED = 0.01
-#: Scatter of the written times that is worth a word, as a share of a step.
+#: Scatter of the recorded times above which a warning is given, as a share of a step.
 _UNEVEN = 0.05
 
 
 @dataclass(frozen=True)
 class ImportSettings:
-    """What somebody says of a recording.
+    """A person's settings for a recording.
 
-    ``structure``: *motor_speed* is torque or current to the speed of the same shaft, which alone
-    allows inertia, notches and gains; *load_speed* the speed behind the coupling; *speed_loop*
-    speed reference to speed. ``output_filter_hz`` is a first-order low-pass that the recorded
-    output went through; ``current_bandwidth_hz`` and ``loop_delay_s`` are the drive's, for gains.
+    ``structure``: *motor_speed*: torque or current to the speed of the same shaft, the only one
+    that permits inertia, notches and gains; *load_speed*: to the speed behind the coupling;
+    *speed_loop*: speed reference to speed. ``output_filter_hz``: corner frequency of a first-order
+    low-pass in the recorded output. ``current_bandwidth_hz``, ``loop_delay_s``: those of the drive,
+    for gains.
     """
 
     time: str | None
@@ -66,10 +67,10 @@ class ImportSettings:
 
 
 def evaluate_file(data: bytes, name: str, settings: ImportSettings) -> dict[str, object]:
-    """The answer for a file's bytes.
+    """Evaluate the bytes of a file.
 
     Raises:
-        BadRecording: what is wrong with the file, or with what is said of it.
+        BadRecording: the file or the settings are not usable.
     """
     return evaluate_signals(prepared(read_table(data, name), name, settings), name, settings)
 
@@ -88,10 +89,10 @@ def prepared(table: Table, name: str, settings: ImportSettings) -> Signals:
 
 
 def evaluate_signals(signals: Signals, name: str, settings: ImportSettings) -> dict[str, object]:
-    """The JSON form of a sweep, with what an import says next to it.
+    """Result in the JSON form of a sweep, with additional data of the import.
 
     Raises:
-        BadRecording: the recording supports no answer.
+        BadRecording: the recording does not permit a result.
     """
     scale = scale_of(
         settings.input_unit,
@@ -148,7 +149,7 @@ def _check(settings: ImportSettings, scale: Scale) -> None:
 
 
 def _reported(error: NoResponse, name: str, signals: Signals) -> BadRecording:
-    """One message for each reason that the analysis has."""
+    """The error for each reason that the analysis reports."""
     facts = error.facts
     if error.code == "few-lines":
         return BadRecording(
@@ -321,5 +322,5 @@ def _refuted(wrong: Contradiction) -> Text:
 
 
 def _numbers(values: FloatArray) -> list[float | None]:
-    """JSON has no NaN."""
+    """Values as a list with None for NaN and infinity, which JSON does not have."""
     return [float(v) if np.isfinite(v) else None for v in values]

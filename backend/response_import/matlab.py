@@ -1,4 +1,4 @@
-"""Columns of a MATLAB file of version 4 to 7; the newer HDF5 form is named and refused."""
+"""Columns of a MATLAB file up to version 7; the newer HDF5 format is recognised and refused."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _MOST = 256
 
 
 def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArray, ...]] | None:
-    """Vectors and columns of matrices by name; nothing where it is no MATLAB file.
+    """Vectors and columns of matrices with their names; None where it is not a MATLAB file.
 
-    Fields of a structure are ``structure.field``, columns of a matrix ``matrix(:,3)``.
+    Fields of a structure are named ``structure.field``, columns of a matrix ``matrix(:,3)``.
 
     Raises:
-        BadRecording: version 7.3, damaged, or no numbers in it.
+        BadRecording: version 7.3, damaged, or without numbers.
     """
     if data[:8] == b"\x89HDF\r\n\x1a\n" or data[512:520] == b"\x89HDF\r\n\x1a\n":
         raise BadRecording(
@@ -41,7 +41,7 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
         file: Any = io.BytesIO(data)
         found = loadmat(file, squeeze_me=False, struct_as_record=True, chars_as_strings=True)
     except Exception as error:
-        # A damaged file makes this reader raise nearly anything; it runs in a process of its own.
+        # With a damaged file this reader may raise nearly any error; it runs in a separate process.
         raise BadRecording("import.damaged-matlab-file", value=name, cause=str(error)) from error
     names: list[str] = []
     columns: list[FloatArray] = []
@@ -54,7 +54,7 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
 
 
 def _refuse_bomb(data: bytes, name: str) -> None:
-    """Compressed elements (type 15) are counted unpacked, before they are unpacked as a whole."""
+    """Check the unpacked size of compressed elements (type 15) before unpacking them as a whole."""
     order = "<" if data[126:128] == b"IM" else ">"
     place, total = 128, 0
     while place + 8 <= len(data):

@@ -1,4 +1,4 @@
-"""What a file holds, so that somebody can choose its columns."""
+"""Preview of a file, for a person to choose its columns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def preview(data: bytes, name: str) -> dict[str, object]:
     """Columns by number and name, with first values, range and a thinned curve.
 
     Raises:
-        BadRecording: no table in it.
+        BadRecording: the file contains no table.
     """
     table = read_table(data, name)
     columns = []

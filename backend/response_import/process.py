@@ -1,8 +1,8 @@
-"""Imports in a process of their own: ``python -m backend.response_import.process``.
+"""Imports in a separate process: ``python -m backend.response_import.process``.
 
-A file of somebody else may take seconds and much memory, and it is not known what is in it. Here it
-holds up no motion and whoever started it can end it. One task comes pickled on the standard input,
-from our own parent only; one JSON object goes to the standard output.
+A file from elsewhere may take seconds and much memory, and its contents are not known. In its own
+process the import does not delay motion, and its caller can end it. One pickled task comes from
+the parent process by standard input; one JSON object goes to standard output.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from backend.work.apart import answer_of
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.texts.message import Text, prose, text
 
-#: An evaluation that takes longer is ended: the largest file takes a fraction of it.
+#: Time limit of an evaluation [s]; the largest file takes a fraction of it.
 LIMIT_S = 120.0
-#: More memory than any file within the limits needs.
+#: Memory limit of the process: more than any permitted file needs.
 _MEMORY_BYTES = 6 << 30
 
 
 @dataclass(frozen=True, slots=True)
 class ImportTask:
-    """A file's bytes and what is said of them; without ``settings`` only its columns are shown."""
+    """A file's bytes with a person's settings; without ``settings`` only a preview is made."""
 
     data: bytes
     name: str
@@ -50,10 +50,10 @@ class ImportTask:
 
 
 async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[str, Any]:
-    """Carry out a task in a process of its own, which ends with the caller's task.
+    """Carry out a task in a separate process, which ends with the caller's task.
 
     Raises:
-        BadRecording: what is wrong with the file, or it takes too long.
+        BadRecording: the file is not usable, or its evaluation takes too long.
     """
     try:
         given = await answer_of("backend.response_import.process", task=task, limit_s=limit_s)
@@ -88,9 +88,9 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
 
 def main() -> None:
     """Carry out the one task of this process."""
-    # STOP and the buses go first, however many files are read.
+    # STOP and the buses have priority, however many files are read.
     yield_processor()
-    # Where the system can: a file made to exhaust the memory ends this process alone.
+    # Where the system supports it, a file made to exhaust the memory ends only this process.
     limit_memory(_MEMORY_BYTES)
     task: ImportTask = pickle.load(sys.stdin.buffer)  # noqa: S301 - from our own parent
     answer: dict[str, object]

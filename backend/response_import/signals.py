@@ -1,4 +1,4 @@
-"""Time, input and output of a table: which columns they are, and that they can be evaluated."""
+"""Time, input and output of a table: selection of the columns, and checks before evaluation."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from backend.response_import.errors import BadRecording
 from drivers.texts import limits
 from drivers.texts.message import text
 
-#: Steps of time may differ from their median by this share: a clock that is written in few digits.
+#: Largest relative deviation of a time step from the median, as for a clock with few digits.
 _JITTER = 0.1
-#: Written times may scatter by so much of a step about an even clock (standard deviation): they are
-#: those of the recorder, while the samples are even.
+#: Largest standard deviation of recorded times from an even clock, as a share of a step: the times
+#: are those of the recorder, while the samples are even.
 _SCATTER = 0.3
-#: More alike from one step to the next, in size of the correlation, is a pattern and no scatter.
+#: Magnitude of the correlation between successive deviations above which they are a pattern and not
+#: scatter.
 _PATTERN = 0.5
-#: A sample is lost where the times behind a step lie so much of a step later than those before it,
-#: in the median of so many to each side.
+#: A sample is lost where the times after a step are later by this share of a step than those before
+#: it, in the median over this number of samples on each side.
 _LOST, _BESIDE = 0.5, 12
-#: Rates between which a recording of an axis lies.
+#: Range of plausible sampling rates for a recording of an axis.
 _SLOWEST_HZ, _FASTEST_HZ = 10.0, 10e6
 #: Factors to seconds.
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -33,7 +34,7 @@ _TIME_UNIT = re.compile(r"[\[(/_ ]\s*(s|sec|ms|us|µs|μs|ns)\s*[\])]?\s*$", re.
 
 @dataclass(frozen=True)
 class Signals:
-    """Input and output [n], evenly sampled. ``time_unit`` is the unit assumed for the column."""
+    """Input and output [n], evenly sampled. ``time_unit``: unit assumed for the time column."""
 
     signal_in: FloatArray
     signal_out: FloatArray
@@ -43,14 +44,14 @@ class Signals:
     time_unit: str
     repeated_rows: int = 0
     jitter: float = 0.0
-    """Standard deviation of the written times from an even clock, as a share of a step."""
+    """Standard deviation of the recorded times from an even clock, as a share of a step."""
 
 
 def column_of(table: Table, wanted: str, use: str, name: str) -> int:
-    """Number of a column by its name, by its name without unit, or by its number from 1.
+    """Index of a column by its name, by its name without unit, or by its number from 1.
 
     Raises:
-        BadRecording: none, or several.
+        BadRecording: no column, or several.
     """
     key = wanted.strip()
     lower = [n.lower() for n in table.names]
@@ -92,10 +93,10 @@ def signals_of(
     table: Table, name: str, *, time: str | None, signal_in: str, signal_out: str,
     time_unit: str | None = None, sample_rate_hz: float | None = None,
 ) -> Signals:  # fmt: skip
-    """Checked signals; ``sample_rate_hz`` instead of a time column where there is none.
+    """Checked signals; ``sample_rate_hz`` is given where there is no time column.
 
     Raises:
-        BadRecording: what is wrong, with column, row and value.
+        BadRecording: the signals are not usable; the error has column, row and value.
     """
     first, second = (
         column_of(table, signal_in, "input", name),
@@ -149,14 +150,14 @@ def signals_of(
 
 
 def unit_in(name: str) -> str:
-    """Unit that a time column's name ends with; seconds without one."""
+    """Unit at the end of a time column's name; seconds without one."""
     found = _TIME_UNIT.search(name)
     text = found.group(1).lower().replace("µ", "u").replace("μ", "u") if found else "s"
     return "s" if text == "sec" else text
 
 
 def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
-    """The columns up to where the first of them ends; no gaps inside."""
+    """The columns up to the end of the shortest, after a check that they have no gaps."""
     columns = [table.columns[i] for i in used]
     ends = []
     for i, values in zip(used, columns, strict=True):
@@ -206,10 +207,10 @@ def _check_rate(rate: float, name: str, what: str) -> None:
 def _clock(
     t: FloatArray, same: np.ndarray, name: str, table: Table, column: int, unit: str
 ) -> tuple[float, np.ndarray, float]:
-    """Rate, the rows that count, and the clock's jitter.
+    """Sampling rate [Hz], mask of the rows that count [n], and the clock's jitter.
 
-    A row that repeats time and values (``same`` [n - 1]) counts once; one that repeats the time
-    alone has a time in few digits.
+    A row that repeats time and values (``same`` [n - 1]) counts once. A row that repeats only the
+    time counts, as its time has few digits.
     """
     head = table.names[column]
 
@@ -222,7 +223,7 @@ def _clock(
         raise BadRecording(
             "import.time-column-not-rise", parameter="time", value=float(t[0]), name=name, head=head
         )
-    # Times that scatter may go back by less than a step.
+    # Scattering times may decrease by less than a step.
     back = np.flatnonzero(steps < -float(np.median(steps)))
     if back.size:
         row = int(back[0]) + 1
@@ -254,12 +255,12 @@ def _clock(
     usual = float(np.median(steps))
     rows = np.flatnonzero(kept)
     uneven = np.abs(steps - usual) > _JITTER * usual
-    # A clock in few digits steps unevenly and keeps its pace.
+    # A clock with few digits has uneven steps but a constant mean rate.
     even = usual * np.arange(steps.size + 1)
     pace = float(np.polyfit(np.arange(even.size), t[kept], 1)[0])
     off = (t[kept] - pace * np.arange(even.size)) / pace
     drift = np.abs(off - np.median(off))
-    # Times scatter to and fro; a lost sample moves all that follow.
+    # Scatter is temporary; a lost sample shifts all following times.
     lost, (jitter, pattern) = _lost(off), _scatter(off)
     wrong = lost if lost.size else np.flatnonzero(uneven)
     if (
@@ -282,7 +283,7 @@ def _clock(
         )
     rate = 1.0 / pace
     _check_rate(rate, name, f"sample rate (time in {unit})")
-    # A written clock of few digits is a whole number of hertz more often than not.
+    # With a clock of few digits the rate most likely is an integer in hertz.
     nearest = round(rate)
     if nearest and abs(rate - nearest) < 1e-5 * rate:
         rate = float(nearest)
@@ -290,15 +291,18 @@ def _clock(
 
 
 def _lost(off: FloatArray) -> np.ndarray:
-    """Steps after which the times [n], in steps from an even clock, stay later."""
+    """Indices of steps after which all times are later.
+
+    ``off`` [n]: deviation of the times from an even clock, in steps.
+    """
     if off.size < 2 * _BESIDE + 1:
         return np.flatnonzero(np.abs(np.diff(off)) > _LOST)
     windows = np.median(np.lib.stride_tricks.sliding_window_view(off, _BESIDE), axis=1)
-    # Before step i lie the times up to i, behind it those from i + 1.
+    # Before step i are the times up to i, after it those from i + 1.
     later = windows[_BESIDE:] - windows[:-_BESIDE]
     inner = np.flatnonzero(later > _LOST) + _BESIDE - 1
     steps = np.diff(off)
-    # Of the steps about a lost sample it is the longest one.
+    # Of the steps around a lost sample the longest one is taken.
     found = set()
     for i in inner:
         first = max(int(i) - _BESIDE, 0)
@@ -307,8 +311,11 @@ def _lost(off: FloatArray) -> np.ndarray:
 
 
 def _scatter(off: FloatArray) -> tuple[float, float]:
-    """Deviation about the median of the neighbours, as a clock may drift slowly, and its pattern:
-    the size of the correlation between one step and the next."""
+    """Scatter of the times ``off`` [n], and the correlation of successive deviations.
+
+    Deviations are taken from the median of the neighbours, as a clock may drift slowly. The first
+    value is their standard deviation, the second the magnitude of the correlation.
+    """
     width = min(4 * _BESIDE + 1, off.size)
     middle = np.median(np.lib.stride_tricks.sliding_window_view(off, width), axis=1)
     first = (width - 1) // 2

@@ -1,4 +1,4 @@
-"""An import as a stored measurement, so that it reopens and is evaluated again."""
+"""An import as a stored measurement, which can be opened and evaluated again."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def pack_import(
     result: Mapping[str, object],
     saved: datetime,
 ) -> bytes:
-    """A measurement file with both signals as they stood in the file."""
+    """A measurement file with both signals as they were in the imported file."""
     meta = {
         "tool": TOOL,
         "file": name,
@@ -42,11 +42,11 @@ def pack_import(
 def reevaluate(
     arrays: Mapping[str, npt.NDArray[np.generic]], meta: Mapping[str, object]
 ) -> dict[str, object]:
-    """The answer again, from the kept signals.
+    """Evaluate the stored signals again.
 
     Raises:
         ValueError, KeyError, TypeError: not the data of an import.
-        BadRecording: the recording supports no answer.
+        BadRecording: the recording does not permit a result.
     """
     given = meta["settings"]
     if not isinstance(given, dict):

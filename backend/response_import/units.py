@@ -12,7 +12,7 @@ from drivers.texts import limits
 InputUnit = Literal["Nm", "mNm", "A", "mA", "rated", "percent", "permille", "rad/s", "rpm", "1"]
 OutputUnit = Literal["rad/s", "rpm", "rev/s", "deg/s", "m/s", "rad", "rev", "deg", "1"]
 
-#: Factor to Nm, A, rated torque or rad/s, and which of these.
+#: Factor to the base unit (Nm, A, rated torque, rad/s or 1), and that unit.
 _INPUT: dict[str, tuple[float, str]] = {
     "Nm": (1.0, "Nm"), "mNm": (1e-3, "Nm"), "A": (1.0, "A"), "mA": (1e-3, "A"),
     "rated": (1.0, "rated"), "percent": (1e-2, "rated"), "permille": (1e-3, "rated"),
@@ -27,7 +27,10 @@ _OUTPUT: dict[str, tuple[float, str]] = {
 
 @dataclass(frozen=True)
 class Scale:
-    """Factors of both signals, the unit of the response, and whether the input is a torque."""
+    """Factors of both signals and the unit of the response.
+
+    ``torque``: whether the input is a torque; ``speed``: whether the output is an angular speed.
+    """
 
     factor_in: float
     factor_out: float
@@ -43,10 +46,11 @@ def scale_of(
     torque_constant_nm_a: float | None,
     unit: str | None,
 ) -> Scale:
-    """What both signals are multiplied by.
+    """Factors by which both signals are multiplied, with the unit of the response.
 
-    A current becomes a torque by its constant, a share of the rated torque by that; ``unit``
-    overrides the response's unit as a text.
+    A current becomes a torque by the torque constant, a share of the rated torque by the rated
+    torque; ``unit`` replaces the text of the response's unit.
+
 
     Raises:
         BadRecording: an unknown unit, or a constant that does not fit it.

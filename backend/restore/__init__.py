@@ -1,1 +1,1 @@
-"""The restore lists: values that are changed for the length of a motion, kept on the disk."""
+"""Restore lists: values that are changed for the duration of a motion, stored on the disk."""

@@ -1,4 +1,4 @@
-"""Which drive a restore list is about, whoever asks: a server by its list, a command by a scan."""
+"""Identity of the drive of a restore list, the same for a server's axis list and a scan."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from backend.drive.drive import Drive
 
 @dataclass(frozen=True, slots=True)
 class DriveIdentity:
-    """What is known of a drive: its numbers in 1018h, and the bus URL and station of its ports.
+    """Identity of a drive: its numbers in 1018h, and bus URL and station of its ports.
 
     A number is None where it is not known.
     """
@@ -22,8 +22,8 @@ class DriveIdentity:
     def is_of(self, other: DriveIdentity) -> bool:
         """Whether both are the same drive.
 
-        The same serial number of the same product is the same drive wherever it hangs; without
-        one, the same place is, as long as no number contradicts it.
+        Drives with the same serial number and product are the same wherever they are connected.
+        Otherwise drives with the same bus and station are, unless a known number differs.
         """
         if any(None not in (a, b) and a != b for a, b in self._numbers(other)):
             return False
@@ -40,7 +40,7 @@ class DriveIdentity:
 
 
 def identity_of(drive: Drive) -> DriveIdentity:
-    """Of a drive that is connected; settings of the line are no part of a place."""
+    """Identity of a connected drive; bus URLs are without line settings."""
     found = drive.found
     return DriveIdentity(
         vendor_id=None if found is None else found.vendor_id or None,

@@ -1,4 +1,4 @@
-"""The restore list of a connected drive: recalled once, and written from then on."""
+"""The restore list of a connected drive: loaded once, and written after every change."""
 
 from __future__ import annotations
 
@@ -18,13 +18,11 @@ def keep_list(
     in_motion: Callable[[], bool],
     failed: Callable[[StorageFailed], None],
 ) -> None:
-    """Recall what is pending in a drive; write its list whenever something is changed temporarily
-    or back.
+    """Load the pending restores of a drive; write its list at every temporary change or restore.
 
-    ``in_motion`` says whether the next process has to stop the axis. Where the list cannot be
-    written before a value changes, `PendingRestores.temporary` raises, and nothing is changed.
-    ``failed`` is called once per failure of the disk at any other time: a motion that goes on is
-    not ended by it.
+    ``in_motion`` returns whether the next process has to stop the axis. Where the list cannot be
+    written before a value changes, `PendingRestores.temporary` raises, and nothing is changed. At
+    any other time ``failed`` is called, once per failure of the disk, and does not end a motion.
     """
     drive.pending_restores.recall(known.pending.values)
     well = True

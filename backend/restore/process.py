@@ -1,4 +1,4 @@
-"""Whether the process that changed values still lives: then it restores them itself."""
+"""Check whether the process that changed values still runs and so restores them itself."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from drivers.computer.processes import process_mark
 
 
 def this_process() -> str:
-    """A mark of this process that no other one has, after a restart of the computer neither."""
+    """Unique mark of this process, also across restarts of the computer."""
     return process_mark(os.getpid()) or f"{os.getpid()}"
 
 
 def lives(mark: str) -> bool:
-    """Whether the process of this mark runs now; False where the system does not say."""
+    """Whether the process of this mark runs now; False where the system does not report it."""
     number = mark.partition(" ")[0]
     return number.isdigit() and mark == (process_mark(int(number)) or f"{os.getpid()}")

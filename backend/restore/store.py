@@ -1,8 +1,8 @@
-"""Restore lists on the disk: whoever is killed in a motion, server or command, restores nothing.
+"""Restore lists on the disk, as a server or command killed in a motion restores nothing.
 
 One small file per drive in the state folder while values are changed or pending, none otherwise.
-It is written before the first temporary value changes, and the disk is waited for then, but no
-longer than a motion may begin late by it.
+It is written before the first temporary value changes; the motion waits for the disk then, but no
+longer than `FLUSH_S`.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from backend.restore.process import lives, this_process
 from backend.store.files import StorageFailed, write_atomically
 from profiles.schema import Raw
 
-#: What moves is this long after the last note still the doing of the process that was killed;
-#: later somebody else may have the machine.
+#: Time after the last write of the list for which a motion is attributed to the killed process [s];
+#: later somebody else may be using the machine.
 A_MOMENT_S = 600.0
-#: A motion begins at most so much later because the disk is waited for.
+#: Longest delay of a motion by waiting for the disk [s].
 FLUSH_S = 0.02
 _DAMAGED = ".damaged"
 
@@ -59,7 +59,7 @@ class _List(BaseModel):
 
 
 class _Earlier(BaseModel):
-    """The form before lists had an identity: one file per id of a server's drive."""
+    """File format before lists had an identity: one file per id of a server's drive."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -70,12 +70,12 @@ class _Earlier(BaseModel):
 
 @dataclass(frozen=True)
 class Pending:
-    """What a process that is no more has left in a drive.
+    """Restores that an ended process has left pending in a drive.
 
-    ``since`` is when it noted this last (seconds since 1970), ``by`` what it was. ``moved``: it
-    ended a moment ago in the middle of a motion. ``held_by`` is another process that lives and
-    moves this drive with temporary values now, and ``serial`` that of the drive which was here.
-    ``unreadable`` are damaged lists of this place: what they held is not known.
+    ``since``: time of its last write (seconds since 1970); ``by``: its name. ``moved``: it ended
+    less than `A_MOMENT_S` ago during a motion. ``held_by``: another running process that moves this
+    drive with temporary values now. ``serial``: serial number of the drive in the list.
+    ``unreadable``: damaged lists of this station, whose contents are not known.
     """
 
     values: tuple[PendingRestore, ...] = ()
@@ -89,7 +89,7 @@ class Pending:
 
 @dataclass
 class RestoreList:
-    """The list of one drive on the disk, as this process keeps it."""
+    """The list of one drive on the disk, as written by this process."""
 
     folder: Path
     identity: DriveIdentity
@@ -106,8 +106,7 @@ class RestoreList:
         identity: DriveIdentity | None = None,
         durable: bool = False,
     ) -> None:
-        """Note what is changed temporarily or pending now instead of what was; nothing takes the
-        file away.
+        """Write the values that are temporary or pending now; without any, remove the file.
 
         ``durable`` waits for the disk, up to `FLUSH_S`.
 
@@ -144,7 +143,7 @@ class RestoreList:
 
 
 class RestoreStore:
-    """All restore lists of a state folder. ``by`` says as text who writes them."""
+    """All restore lists of a state folder. ``by``: name of the process that writes them."""
 
     def __init__(self, state_folder: Path, by: str) -> None:
         self._folder = state_folder / "restore"
@@ -154,9 +153,9 @@ class RestoreStore:
     def list_of(self, drive: DriveIdentity, drive_id: str) -> RestoreList:
         """The list of one drive, with what earlier processes left pending in it.
 
-        ``drive_id`` is the server's name of it, by which servers before this version noted it.
-        Of a list that was written at another place the values are only offered: not every maker's
-        serial numbers differ, and the other drive may still be where it was.
+        ``drive_id``: the server's id of the drive, the file name in earlier versions. Values of a
+        list from another station are only offered and not restored automatically, as some makers'
+        serial numbers are not unique and the other drive may still be at its station.
         """
         own = self._folder / f"{_slug(drive)}.json"
         known, values = Pending(), dict[str, PendingRestore]()
@@ -172,7 +171,7 @@ class RestoreStore:
                 continue
             taken.append(file)
             here = set(note.identity.places) & set(drive.places) or not note.places
-            # The older list knows what it was before both.
+            # The older list has the value from before both motions.
             values = {v.key: _entry(v, known=bool(here)) for v in note.values} | values
             known = Pending(
                 tuple(values.values()),
@@ -189,7 +188,7 @@ class RestoreStore:
         )
 
     def _lists(self) -> list[tuple[Path, _List, float]]:
-        """All that can be read, the oldest first."""
+        """All readable lists with file and time of writing, the oldest first."""
         found = []
         for file in self._folder.glob("*.json"):
             try:
@@ -201,7 +200,7 @@ class RestoreStore:
         return sorted(found, key=lambda each: each[2])
 
     def _set_aside(self, drive: DriveIdentity) -> tuple[Path, ...]:
-        """Damaged lists of the places of this drive, named so that no new list replaces them."""
+        """Damaged lists of this drive's stations, renamed so that no new list replaces them."""
         names = "|".join(re.escape(_place_words(*place)) for place in drive.places)
         ours = re.compile(rf"(?:{names})-[0-9a-f]{{8}}(?:-\d+)?\.json(?:\{_DAMAGED})?")
         found = []
@@ -253,13 +252,13 @@ def _sound(file: Path) -> bool:
 
 
 def _entry(value: _Value, *, known: bool = True) -> PendingRestore:
-    """``known``: whether what the motion left there is known of this drive."""
+    """The entry as pending restore; ``known``: whether its ``left`` values hold for this drive."""
     left = frozenset(value.left) if known else frozenset()
     return PendingRestore(value.key, value.raw, left, value.unapplied)
 
 
 def _slug(drive: DriveIdentity) -> str:
-    """A name for the file: readable, and another one for another drive or place."""
+    """File name without suffix: readable, and different for another drive or station."""
     url, station = drive.places[0] if drive.places else ("", 0)
     words = _place_words(url, station)
     whole = f"{url} {station} {drive.vendor_id} {drive.product_code} {drive.serial}"
@@ -271,14 +270,14 @@ def _place_words(url: str, station: int) -> str:
 
 
 def _flush(file: Path) -> None:
-    """The file and its name are on the disk; a slow disk goes on with it by itself."""
+    """Flush the file and its folder to the disk, waiting up to `FLUSH_S`; a slow disk continues."""
 
     def flushed() -> None:
         for path in (file, file.parent):
             try:
                 handle = os.open(path, os.O_RDONLY)
             except OSError:
-                # A system where folders cannot be opened, or a list that is done with already.
+                # A system where folders cannot be opened, or a list that was removed meanwhile.
                 continue
             try:
                 os.fsync(handle)

@@ -1,5 +1,5 @@
-"""What a raw position, speed or acceleration of one drive means, and how that is known.
+"""Scales of raw positions, speeds and accelerations of one drive, with their origins.
 
-`scale` holds the types, `resolve` finds them in the profile and the drive, `taught` is what a
-person has said of an axis, `compare` looks whether 606Ch and 6064h of a recording agree.
+`scale` holds the types, `resolve` determines them from profile and drive, `taught` holds what a
+person stated of an axis, `compare` checks whether 606Ch and 6064h of a recording agree.
 """

@@ -1,7 +1,8 @@
-"""Whether 606Ch and 6064h of a whole recording report the same motion.
+"""Check whether 606Ch and 6064h of a whole recording report the same motion.
 
-The loop watches them while the axis moves (`drivers.feedback`) and must decide at once. A
-recording shows more: also at low speeds and to and fro, and before anything is computed from 606Ch.
+The loop supervises them while the axis moves (`drivers.feedback`) and must decide at once. The
+check of a recording also covers low speeds and reciprocating motion, and comes before any result
+is computed from 606Ch.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from drivers.halt import HaltCause, Halted
 FloatArray = npt.NDArray[np.float64]
 
 _WINDOW_S = 0.04
-"""Means over this long; a 606Ch that lags some cycles differs little then."""
+"""Length of the means that are compared [s]; a lag of 606Ch by some cycles hardly matters then."""
 _RELATIVE = 0.25
-"""Share by which the scale may seem other than stated: lag, means and rounding do that."""
+"""Relative deviation of the scale that lag, averaging and rounding may cause."""
 _COUNTS = 2.0
 _IGNORED_SHARE = 1 / 6
-"""Of what the loop ignores: 5 of 30 rpm. 606Ch that is coarser widens it by its own step."""
+"""Share of the difference that the loop ignores: 5 of 30 rpm. A coarser 606Ch widens it to its own
+step, but to no more than `_MOST_STEPS` times the loop's value."""
 _MOST_STEPS = 3.0
 
 
@@ -31,12 +33,11 @@ def disagreement_of(
     scale: FeedbackScale,
     valid: npt.NDArray[np.bool_] | None = None,
 ) -> Halted | None:
-    """What a recording of raw 6064h and 606Ch [n] contradicts itself by; None where it agrees.
+    """The contradiction between raw 6064h and 606Ch [n] of a recording; None where they agree.
 
-    Only means over samples that are all ``valid`` [n] count: across a gap both are guessed.
-
-    ``value`` and ``limit`` of the answer are root mean squares of both speeds, raw 606Ch, with the
-    sign in which they go together.
+    Only means over samples that are all ``valid`` [n] count, as samples in a gap are not measured.
+    ``value`` and ``limit`` of the result are the root mean squares of the reported speed and of the
+    speed from the position, in raw 606Ch; ``value`` is negative where the signs are opposite.
     """
     length = max(round(_WINDOW_S / cycle_s), 2)
     count = (len(position) - 1) // length
@@ -74,7 +75,7 @@ def disagreement_of(
 def measured_scale(position: FloatArray, velocity: FloatArray, cycle_s: float) -> float | None:
     """Raw 606Ch per increment per second of a recording, by least squares over means.
 
-    None where the axis hardly moved or the two do not go together.
+    None where the axis hardly moved or the two speeds are not correlated.
     """
     length = max(round(_WINDOW_S / cycle_s), 2)
     count = (len(position) - 1) // length
@@ -92,9 +93,9 @@ def measured_scale(position: FloatArray, velocity: FloatArray, cycle_s: float) -
 
 
 def _moved(places: FloatArray) -> FloatArray:
-    """Differences of positions of 32 bits, over their end too."""
+    """Differences of 32-bit positions, also across their overflow."""
     return np.asarray((np.diff(places) + 2.0**31) % 2.0**32 - 2.0**31)
 
 
 _TOGETHER = 0.95
-"""Squared correlation from which on two speeds are one quantity in two units."""
+"""Squared correlation above which two speeds are the same quantity in different units."""

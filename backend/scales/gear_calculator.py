@@ -1,8 +1,8 @@
-"""From the mechanics to the electronic gear: pure, with the rounding that a drive forces.
+"""Electronic gear from the mechanics, with the rounding that the drive's parameters require.
 
-A *user increment* is what one count of the position objects shall mean, 0.001 mm for example.
-The wanted number of user increments per motor revolution follows from the mechanics; the drive's
-gear parameters can hold it exactly or only nearly, and the difference is reported.
+A *user increment* is the travel of one count of the position objects, 0.001 mm for example. The
+wanted number of user increments per motor revolution follows from the mechanics; the drive's gear
+parameters hold it exactly or approximately, and the difference is reported.
 
 Sources: CiA 402-2 clause 7 (608Fh, 6091h, 6092h); 001:1011 to 001:1080 (EP3E, the same objects
 with worked examples); 002:2557 (R6L, 6091h is encoder increments over user increments);
@@ -26,16 +26,16 @@ _Length = Annotated[float, Field(gt=1e-6, le=1e6, allow_inf_nan=False)]
 _Teeth = Annotated[int, Field(ge=1, le=100_000)]
 #: Largest denominator with which a length or π is written as a fraction.
 _FINEST = 1_000_000
-#: Relative error that no axis shows: 0.1 µm in a kilometre.
+#: Relative error that is negligible on every axis: 0.1 µm in a kilometre.
 _EXACT = Fraction(1, 10**10)
 
 
 class Mechanics(BaseModel):
-    """What turns the motor's revolution into travel.
+    """Mechanics that convert a motor revolution into travel.
 
-    *screw*: ``lead_mm`` per turn. *belt*: ``diameter_mm``, or ``pitch_mm`` times ``teeth`` of the
-    pulley. *rack*: ``module_mm`` times ``teeth`` of the pinion, or its ``pitch_mm``. *rotary*: a
-    table of 360°. ``motor_turns`` to ``load_turns`` is the gearbox.
+    *screw*: ``lead_mm`` per turn. *belt*: ``diameter_mm`` of the pulley, or ``pitch_mm`` times its
+    ``teeth``. *rack*: ``module_mm`` or ``pitch_mm`` of the pinion, times its ``teeth``. *rotary*: a
+    table of 360°. The gearbox makes ``load_turns`` from ``motor_turns``.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -91,7 +91,7 @@ class Mechanics(BaseModel):
 
 
 def _exact(number: float) -> Fraction:
-    """The decimal number that a person typed."""
+    """The decimal number as a person typed it."""
     return Fraction(repr(number)).limit_denominator(10**9)
 
 
@@ -109,11 +109,11 @@ class GearValue:
 
 @dataclass(frozen=True, slots=True)
 class GearPlan:
-    """What would be written, and what follows from it.
+    """Parameters that would be written, and the resulting resolution and range.
 
-    ``wanted`` and ``reached`` are user increments per motor revolution. ``error_ppm`` is the
-    error of every travelled distance. ``encoder_travel`` is the travel of one encoder increment,
-    ``range_travel`` that of 2³¹ user increments, in ``unit``.
+    ``wanted`` and ``reached``: user increments per motor revolution. ``error_ppm``: relative error
+    of every distance [ppm]. ``encoder_travel``: travel of one encoder increment, ``range_travel``:
+    travel of 2³¹ user increments, in ``unit``.
     """
 
     unit: str
@@ -131,8 +131,8 @@ class GearPlan:
 def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None) -> GearPlan:
     """Gear parameters for these mechanics.
 
-    ``encoder_counts`` are the increments per motor revolution of the encoder at hand, None where
-    the drive does not report; then the profile's own figure counts.
+    ``encoder_counts``: increments per motor revolution of the connected encoder; None where the
+    drive does not report them, and then the figure of the profile is used.
 
     Raises:
         OutOfRange: a dimension is missing, the numbers do not fit the drive's parameters, or the
@@ -174,7 +174,7 @@ def plan_gear(profile: Profile, mechanics: Mechanics, encoder_counts: int | None
 
 
 def _standard(profile: Profile, mechanics: Mechanics) -> dict[str, int]:
-    """6091h is the gearbox, 6092h the user increments of one turn of the load."""
+    """6091h holds the gearbox, 6092h the user increments of one turn of the load."""
     spec = profile.units
     gearbox = Fraction(mechanics.motor_turns, mechanics.load_turns)
     feed = _fit(profile, mechanics.increments_per_load_turn(), spec.feed, spec.feed_revolutions)
@@ -187,7 +187,7 @@ def _standard(profile: Profile, mechanics: Mechanics) -> dict[str, int]:
 
 
 def _by_feed(profile: Profile, wanted: Fraction) -> dict[str, int]:
-    """One parameter holds the user increments of a motor turn; 6091h the rest, if needed."""
+    """The feed holds the user increments of a motor turn; 6091h their denominator, if not 1."""
     spec = profile.units
     fitted = _fit(profile, wanted, spec.feed, spec.gear_numerator)
     return {
@@ -198,7 +198,7 @@ def _by_feed(profile: Profile, wanted: Fraction) -> dict[str, int]:
 
 
 def _by_ratio(profile: Profile, ratio: Fraction) -> dict[str, int]:
-    """Numerator and denominator are encoder increments over user increments."""
+    """Numerator and denominator hold encoder increments over user increments."""
     spec = profile.units
     fitted = _fit(profile, ratio, spec.gear_numerator, spec.gear_denominator)
     return {
@@ -208,7 +208,7 @@ def _by_ratio(profile: Profile, ratio: Fraction) -> dict[str, int]:
 
 
 def _fit(profile: Profile, value: Fraction, above: str | None, below: str | None) -> Fraction:
-    """The nearest fraction whose two numbers the two parameters can hold.
+    """The nearest fraction whose numerator and denominator fit the two parameters.
 
     Raises:
         OutOfRange: even the nearest one is 0, or too large for the parameter.
@@ -229,7 +229,7 @@ def _fit(profile: Profile, value: Fraction, above: str | None, below: str | None
 
 
 def _simplest(value: Fraction, room: int) -> Fraction:
-    """A fraction with small numbers that is exact for every purpose, or the nearest of all."""
+    """A fraction with small numbers whose error is negligible; otherwise the nearest one."""
     finest = 1
     while finest < room:
         fitted = value.limit_denominator(finest)
@@ -257,10 +257,10 @@ def _reached(profile: Profile, raws: dict[str, int], counts: int) -> Fraction:
 
 
 def _check_bounds(profile: Profile, ratio: Fraction) -> Text | None:
-    """Encoder increments per user increment within what the drive accepts; a warning or None.
+    """Check encoder increments per user increment against the drive's bounds; a warning or None.
 
     Raises:
-        OutOfRange: naming the fault that the drive would report.
+        OutOfRange: outside strict bounds; the message names the fault that the drive would report.
     """
     gear = profile.functions.gear
     low, high = gear.min_ratio, gear.max_ratio

@@ -1,8 +1,9 @@
-"""The scales of one axis: who states them, and whether they are certain.
+"""Scales of one axis: their origin, and whether they are certain.
 
-What a person has taught comes first, while the drive is as it was then; then what the drive says
-(60A8h to 60AAh with 608Fh, 6091h and 6092h; CiA 402-2 clause 7), then the maker's file and the
-manual. The defaults of the standard alone are nobody's word: makers use others.
+Order of priority: what a person stated, as long as the drive's scaling objects are unchanged; then
+the drive's own objects (60A8h to 60AAh with 608Fh, 6091h and 6092h; CiA 402-2 clause 7); then the
+maker's file and the manual. The defaults of the standard alone do not make a scale certain, as
+makers use others.
 """
 
 from __future__ import annotations
@@ -28,28 +29,28 @@ _FACTORS = {
     Quantity.ACCELERATION: ("6097:01", "6097:02"),
 }
 _ORIGINS = {"manual": Origin.MANUAL, "makers_file": Origin.MAKERS_FILE, "standard": Origin.UNKNOWN}
-#: Beyond this difference two statements of one resolution are two.
+#: Relative difference above which two values of one resolution or factor disagree.
 _SAME = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class Reported:
-    """Raw values of the drive by key, of the objects that scales rest on; absent ones are not in.
+    """Raw values of the objects that define the scales, by key, without absent objects.
 
-    ``encoder`` is the resolution by the family's own parameter, where it has one.
+    ``encoder``: resolution by the family's own parameter, where it has one [increments/rev].
     """
 
     raws: Mapping[str, int]
     encoder: float | None = None
 
     def get(self, key: str | None) -> int | None:
-        """The raw value, where the drive has the object and it is above 0."""
+        """The raw value, where the drive has the object with a value above 0; None otherwise."""
         raw = self.raws.get(key or "")
         return raw if raw is not None and raw > 0 else None
 
 
 def stating_keys(drive: Drive) -> tuple[str, ...]:
-    """Keys of everything that the scales of this drive rest on."""
+    """Keys of all objects that define the scales of this drive."""
     spec, known = drive.profile.units, drive.profile.by_key
     keys = [spec.gear_numerator, spec.gear_denominator, spec.feed, spec.feed_revolutions]
     keys += [_RESOLUTION, _RESOLUTION_REVS, SI_POSITION, SI_VELOCITY, SI_ACCELERATION]
@@ -64,12 +65,12 @@ def stating_keys(drive: Drive) -> tuple[str, ...]:
 
 
 async def read_reported(drive: Drive, absent: Container[str] = ()) -> Reported:
-    """What the drive says of its scales, read now, without what is known to be ``absent``.
+    """Read the objects that define the scales now, without those known to be ``absent``.
 
     Raises:
         DriveError: an object that it has cannot be read.
     """
-    # At once where the bus can; what failed is asked for alone, to learn whether it exists.
+    # In batches first; objects that failed are read singly, to find out whether they exist.
     readings = await drive.read_many([key for key in stating_keys(drive) if key not in absent])
     failed = [key for key, reading in readings.items() if reading.raw is None]
     readings = readings | await existing(drive, failed)
@@ -83,7 +84,7 @@ async def read_reported(drive: Drive, absent: Container[str] = ()) -> Reported:
 
 
 def scales_of(spec: UnitSpec, reported: Reported, taught: Taught | None) -> Scales:
-    """The scales of a drive with these units in its profile that says this of itself."""
+    """The scales from the units of the profile, the drive's objects and a person's statement."""
     said = taught if taught is not None and taught.holds(reported.raws) else None
     position = _position(spec, reported, said)
     return Scales(
@@ -94,10 +95,10 @@ def scales_of(spec: UnitSpec, reported: Reported, taught: Taught | None) -> Scal
 
 
 def origin_of(spec: UnitSpec, quantity: Quantity) -> Origin:
-    """Who states the unit of this quantity in the profile.
+    """Origin of the unit of this quantity in the profile.
 
-    A profile without a statement has it from its manual, unless its source is the standard: those
-    were imported before the origin was kept.
+    A profile without a stated origin has the unit from its manual, unless its source is the
+    standard: such profiles were imported before the origin was stored.
     """
     stated = spec.origins.get(quantity.value)
     if stated is None:
@@ -142,7 +143,7 @@ def _position(spec: UnitSpec, reported: Reported, said: Taught | None) -> Scale:
 
 
 def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale:
-    """60A8h is an angle or a length."""
+    """Position scale where 60A8h states an angle or a length."""
     turns = unit.turns
     if turns is None:
         if feed is None:
@@ -155,10 +156,10 @@ def _by_unit(unit: SiUnit, name: str, feed: float | None, ratio: float) -> Scale
 
 
 def _zero(spec: UnitSpec, reported: Reported) -> str | None:
-    """The part of a ratio that the drive has at 0; None without one.
+    """Key of the part of a ratio that is 0 in the drive; None without one.
 
-    No ratio has a 0 (CiA 402-2 clause 7): what the drive takes in its place is the maker's choice.
-    A profile may state that a gear with 0 in both parts is one that was never set.
+    A part of 0 is not valid (CiA 402-2 clause 7); what the drive uses in its place is up to the
+    maker. A profile may state that a gear with 0 in both parts was never set and does not count.
     """
     parts: list[str | None] = [spec.gear_numerator, spec.gear_denominator]
     if spec.gear_not_set_at_zero and all(key and reported.raws.get(key) == 0 for key in parts):
@@ -169,14 +170,14 @@ def _zero(spec: UnitSpec, reported: Reported) -> str | None:
 
 
 def _ratio(spec: UnitSpec, reported: Reported) -> float:
-    """Motor revolutions of one revolution of the shaft behind the gear."""
+    """Motor revolutions per revolution of the shaft behind the gear."""
     return float(reported.get(spec.gear_numerator) or 1) / float(
         reported.get(spec.gear_denominator) or 1
     )
 
 
 def _feed(spec: UnitSpec, reported: Reported) -> float | None:
-    """Position units of one revolution of the shaft, where a feed constant is set."""
+    """Position units per revolution of the shaft; None where no feed constant is set."""
     feed = reported.get(spec.feed)
     return None if feed is None else feed / (reported.get(spec.feed_revolutions) or 1)
 
@@ -219,10 +220,10 @@ def _rate(
 
 
 def _other_factor(reported: Reported, quantity: Quantity) -> str | None:
-    """The object that says that raw values are not simply the stated unit; None without one.
+    """Objects that show that raw values may not be in the stated unit; None without any.
 
-    6090h next to another 608Fh, or a factor of 6096h or 6097h that is not 1: whether a drive
-    calculates with them, and before or behind its stated unit, is the maker's choice.
+    They are 6090h where it differs from 608Fh, and 6096h or 6097h where its factor is not 1.
+    Whether and at which point a drive applies them is up to the maker.
     """
     first, second = _FACTORS[quantity]
     numerator, divisor = reported.get(first), reported.get(second) or 1
@@ -256,7 +257,7 @@ def _by_rate_unit(
 
 
 def _seconds_of(quantity: Quantity, unit: SiUnit) -> float | None:
-    """Seconds, or square seconds, in the denominator."""
+    """Seconds, or square seconds, in the unit's denominator."""
     if quantity is Quantity.VELOCITY:
         return unit.seconds
     return unit.square_seconds
@@ -268,10 +269,10 @@ _MULTIPLE = re.compile(r"(?:(0?\.\d+|1|10|100)\s*)?(rpm|r/min|rpm/s|inc/s|inc/sÂ
 def by_text(
     quantity: Quantity, text: str, per_rev: float | None, origin: Origin, spec: UnitSpec
 ) -> Scale:
-    """A unit as a profile prints it: ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``, ``ms``."""
+    """Scale from a unit text of a profile: ``inc/s``, ``rpm``, ``0.1 rpm``, ``rpm/s``, ``ms``."""
     text = text.strip()
     if quantity is Quantity.ACCELERATION and text.startswith("ms"):
-        # A time to a speed: `AxisUnits` converts it, as it is no factor.
+        # A ramp time to a reference speed is not a factor; `AxisUnits` converts it.
         known = spec.ramp_reference_rpm is not None
         return Scale(
             quantity,

@@ -1,4 +1,4 @@
-"""A scale with its origin. Words for it are made by `what_to_do` and `why`, once."""
+"""A scale with its origin. Its texts are made by `what_to_do` and `Scale.why`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.texts.message import Text, text
 
 
 class Quantity(StrEnum):
-    """What is scaled."""
+    """The quantity that a scale converts."""
 
     POSITION = "position"
     VELOCITY = "velocity"
@@ -19,10 +19,10 @@ class Quantity(StrEnum):
 
 
 class Origin(StrEnum):
-    """How a scale is known."""
+    """Origin of a scale."""
 
     MANUAL = "manual"
-    """The profile of this family, with the manual's line."""
+    """The profile of this family, with its reference to the manual."""
     MAKERS_FILE = "makers_file"
     """The maker's ESI or EDS file that the profile was imported from."""
     DRIVE = "drive"
@@ -38,23 +38,23 @@ class Uncertainty(StrEnum):
     """Why a scale is not certain."""
 
     NO_RESOLUTION = "no_resolution"
-    """Neither 608Fh nor 6092h nor the profile reports the increments of a revolution."""
+    """Neither 608Fh nor 6092h nor the profile states the increments of a revolution."""
     FEED_OF_ONE = "feed_of_one"
-    """6092h is 1 next to an encoder of many increments in 608Fh: it was never set."""
+    """6092h is 1, but 608Fh states an encoder of many increments: 6092h was never set."""
     UNIT_AND_FEED = "unit_and_feed"
     """60A8h and 6092h give different numbers of units for a revolution."""
     LINEAR = "linear"
-    """The unit is a length, and nothing shows how far a revolution goes."""
+    """The unit is a length, and the travel of a revolution is not known."""
     NOT_STATED = "not_stated"
     """Neither the drive (60A9h, 60AAh) nor a file nor a manual states the unit."""
     UNREADABLE = "unreadable"
-    """The unit that is stated is none of a position, speed or acceleration."""
+    """The stated unit is not a unit of position, speed or acceleration."""
     BEHIND_GEAR = "behind_gear"
-    """The unit counts turns, and 6091h holds a gear: of which shaft is not said."""
+    """The unit counts turns, and 6091h holds a gear: which shaft turns is not stated."""
     NEEDS_RESOLUTION = "needs_resolution"
-    """The unit counts increments, of which it is not known how many make a revolution."""
+    """The unit counts increments, and the increments of a revolution are not known."""
     FACTOR = "factor"
-    """6090h is another encoder than 608Fh, or 6096h or 6097h holds a factor."""
+    """6090h states another encoder than 608Fh, or 6096h or 6097h holds a factor."""
 
 
 _WHY: Mapping[Uncertainty, str] = {
@@ -68,7 +68,7 @@ _WHY: Mapping[Uncertainty, str] = {
     Uncertainty.NEEDS_RESOLUTION: "scales.why-needs-resolution",
     Uncertainty.FACTOR: "scales.why-factor",
 }
-#: A part of a sentence.
+#: Names of the quantities, as parts of a sentence.
 _NAMES: Mapping[Quantity, str] = {
     Quantity.POSITION: "scales.of-position",
     Quantity.VELOCITY: "scales.of-velocity",
@@ -78,10 +78,11 @@ _NAMES: Mapping[Quantity, str] = {
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """``raw_per_unit``: increments per revolution, or raw per rpm or rpm/s; None where not certain.
+    """Conversion of one quantity between raw values and engineering units, with its origin.
 
-    ``raw_unit`` names one raw step ("inc", "0.1 rpm"), empty where unknown. ``source`` names
-    objects, a file or the manual's place.
+    ``raw_per_unit``: increments per revolution, or raw per rpm or rpm/s; None where not certain.
+    ``raw_unit``: name of one raw step ("inc", "0.1 rpm"), empty where unknown. ``source``: objects,
+    file or place in the manual.
     """
 
     quantity: Quantity
@@ -98,13 +99,13 @@ class Scale:
 
     @property
     def why(self) -> Text | None:
-        """Why it is not certain, as a part of a sentence; None where it is."""
+        """Why it is not certain, as a part of a sentence; None where it is certain."""
         return None if self.uncertainty is None else text(_WHY[self.uncertainty])
 
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """The three of one axis."""
+    """The three scales of one axis."""
 
     position: Scale
     velocity: Scale
@@ -112,7 +113,7 @@ class Scales:
 
     @property
     def all(self) -> tuple[Scale, Scale, Scale]:
-        """In the order in which they are shown."""
+        """All three, in the order in which they are shown."""
         return self.position, self.velocity, self.acceleration
 
 
@@ -140,7 +141,7 @@ class ScaleChanged(NotAllowed):
 
 
 def what_to_do(scale: Scale) -> Text:
-    """How a scale that is not certain becomes so."""
+    """Remedy for a scale that is not certain."""
     if scale.uncertainty in (
         Uncertainty.NO_RESOLUTION,
         Uncertainty.FEED_OF_ONE,

@@ -1,4 +1,4 @@
-"""What a person has said of the scales of an axis: kept with the axis, bound to its gear."""
+"""Scales of an axis that a person stated: stored with the axis, valid for its gear settings."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class Taught(BaseModel):
-    """Scales of one axis by a person or by a measured small motion.
+    """Scales of one axis, stated by a person or measured in a small motion.
 
-    ``bound_to`` are raw values of the drive (gear, feed, resolution, units) under which this was
-    said: with others it says nothing any more.
+    ``bound_to``: raw values of the drive (gear, feed, resolution, units) for which they hold; with
+    other values they are not used.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -28,5 +28,5 @@ class Taught(BaseModel):
     )
 
     def holds(self, raws: Mapping[str, int]) -> bool:
-        """Whether the drive still has the values under which this was said."""
+        """Whether the drive still has the values for which these scales were stated."""
         return all(raws.get(key) == raw for key, raw in self.bound_to.items())

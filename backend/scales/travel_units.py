@@ -1,8 +1,7 @@
 """The unit in which a person types and reads travel: motor revolutions, or mm or ° of the load.
 
-The tools work in revolutions, rpm and rpm/s. A request in another unit is converted once, on its
-way in (`backend.api.drive.convert_motion`), and its messages are written in the unit of
-the request.
+The tools work in revolutions, rpm and rpm/s. A request in another unit is converted once, on
+input (`backend.api.drive.convert_motion`), and its messages use the unit of the request.
 """
 
 from __future__ import annotations
@@ -18,10 +17,11 @@ if TYPE_CHECKING:
 
 
 def travel_unit(drive: str, name: str, mechanics: Mechanics | None, units: AxisUnits) -> TravelUnit:
-    """The unit that a request names, where the axis has it.
+    """The unit of travel with this name, where the axis has it.
 
     Raises:
-        NotAllowed: no mechanics are kept that travel in it, or increments per turn are unknown.
+        NotAllowed: the axis has no mechanics with this unit, or its increments per revolution are
+            unknown.
         OutOfRange: the mechanics lack a dimension.
     """
     if name == REVOLUTIONS.name:

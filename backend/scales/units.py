@@ -1,7 +1,7 @@
-"""Motion quantities of one axis: raw drive units to revolutions, rpm, rpm/s and per cent.
+"""Conversion of motion quantities of one axis: raw drive units to rev, rpm, rpm/s and per cent.
 
 Sources: CiA 402-2 clause 7 (position factor: encoder resolution, gear ratio, feed constant) and
-each profile's ``units``, which carries the manual's line.
+each profile's ``units``, with its reference to the manual.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from profiles.schema import Parameter, UnitSpec
 
 #: Raw units per 1 % of rated torque.
 _RAW_PER_PERCENT = {"‰ rated": 10.0, "0.1 %": 10.0, "% rated": 1.0, "0.01 %": 100.0}
-#: A difference of 606Ch from the position below this is the rounding of a coarse 606Ch.
+#: A difference between 606Ch and the speed from positions below this is rounding of a coarse 606Ch.
 _IGNORED_RPM = 30.0
 _RAW = "raw"
 
@@ -30,15 +30,15 @@ _RAW = "raw"
 class AxisUnits:
     """Scales of one axis. ``counts_per_rev`` is None where the resolution is unknown.
 
-    To show a raw value is always possible: without a certain scale it is shown as it is, under its
-    raw name. To make a raw value of one in engineering units raises `ScaleUnknown` then, so that
-    no tool can move by a unit that is unknown.
+    A raw value can always be shown: without a certain scale it is shown unconverted, in its raw
+    unit. The conversion from engineering units to raw raises `ScaleUnknown` in that case, so that
+    no tool can move by an unknown unit.
     """
 
     spec: UnitSpec
     counts_per_rev: float | None
     stated: Scales | None = None
-    """As they were found; None: as the profile's texts have them."""
+    """Scales as resolved for the drive; None: as stated by the units of the profile."""
     drive: str = "the drive"
 
     @property
@@ -82,7 +82,7 @@ class AxisUnits:
         }
 
     def _raw_per(self, scale: Scale) -> float:
-        """Raises ScaleUnknown where it is not certain."""
+        """Raw values per unit; raises ScaleUnknown where the scale is not certain."""
         if scale.raw_per_unit is None:
             raise ScaleUnknown(self.drive, scale)
         return scale.raw_per_unit
@@ -103,16 +103,16 @@ class AxisUnits:
         return self.counts_per_rev
 
     def require_certain(self) -> None:
-        """Position and speed have certain scales, so that an envelope means what it says.
+        """Check that the scales of position and speed are certain, so that an envelope holds.
 
         Raises:
-            ScaleUnknown: one has not; what to do is in its remedy.
+            ScaleUnknown: one is not certain; the error contains a remedy.
         """
         self._per_rev  # noqa: B018 - raises
         self._raw_per(self.scales.velocity)
 
     def position(self, raw: float) -> float:
-        """Increments to revolutions, or the increments themselves."""
+        """Increments to revolutions; without a certain scale the increments themselves."""
         return raw / (self.counts_per_rev or 1.0)
 
     def position_raw(self, revolutions: float) -> int:
@@ -124,7 +124,7 @@ class AxisUnits:
         return round(revolutions * self._per_rev)
 
     def velocity(self, raw: float) -> float:
-        """Raw speed to rpm, or the raw speed itself."""
+        """Raw speed to rpm; without a certain scale the raw speed itself."""
         return raw / (self.scales.velocity.raw_per_unit or 1.0)
 
     def velocity_raw(self, rpm: float) -> int:
@@ -138,7 +138,7 @@ class AxisUnits:
     def velocity_raw_of(self, parameter: Parameter, rpm: float) -> int:
         """Rpm to the raw speed of an object whose own unit may differ from that of 60FFh.
 
-        6099h of the M6-L is in rpm next to velocities in increments per second (000:2167).
+        6099h of the M6-L is in rpm, while its velocities are in increments per second (000:2167).
         """
         if parameter.unit == "rpm":
             return round(parameter.to_raw(rpm))
@@ -146,11 +146,11 @@ class AxisUnits:
 
     @property
     def ramps_are_times(self) -> bool:
-        """Whether ramps are times to a speed; the larger number is the gentler ramp then."""
+        """Whether ramps are times to a reference speed; a larger number is a gentler ramp then."""
         return self.spec.acceleration.startswith("ms")
 
     def acceleration_raw(self, rpm_per_s: float) -> int:
-        """Rpm/s to the raw ramp: a rate, or a time in ms for families that say so.
+        """Rpm/s to the raw ramp: a rate, or a time in ms for families whose ramps are times.
 
         Raises:
             ScaleUnknown: the unit of ramps is not certain.
@@ -171,19 +171,19 @@ class AxisUnits:
 
     @property
     def feedback(self) -> FeedbackScale | None:
-        """How 606Ch and 6064h hang together; None where a scale is not certain."""
+        """Relation between 606Ch and 6064h; None where a scale is not certain."""
         per_rpm = self.scales.velocity.raw_per_unit
         if per_rpm is None or self.counts_per_rev is None:
             return None
         return FeedbackScale(60.0 * per_rpm / self.counts_per_rev, _IGNORED_RPM * abs(per_rpm))
 
     def rest_tolerance(self) -> int:
-        """Increments that an axis at standstill may move by: 0.0005 rev, where that is known."""
+        """Movement that still counts as standstill [increments]: 0.0005 rev, but at least 2."""
         return max(2, round(0.0005 * (self.counts_per_rev or 0.0)))
 
 
 def gentlest_ramp_rpm_s(drive: Drive, key: str) -> float | None:
-    """The gentlest ramp of a drive whose ramps are times; None where nothing bounds it."""
+    """Gentlest ramp of a drive whose ramps are times [rpm/s]; None where it has no bound."""
     spec = drive.profile.units
     reference, longest = spec.ramp_reference_rpm, drive.parameter(key).raw_limits[1]
     if reference is None or not spec.acceleration.startswith("ms") or not longest:
@@ -192,11 +192,11 @@ def gentlest_ramp_rpm_s(drive: Drive, key: str) -> float | None:
 
 
 def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
-    """The raw ramp of this parameter for rpm/s.
+    """The raw ramp of this parameter for a value in rpm/s.
 
     Raises:
-        OutOfRange: gentler than the longest ramp time of the drive; said in rpm/s, as the time in
-            the drive is nothing that anybody typed.
+        OutOfRange: gentler than the longest ramp time of the drive; reported in rpm/s, the unit
+            that was entered.
     """
     raw = units.acceleration_raw(rpm_per_s)
     gentlest = gentlest_ramp_rpm_s(drive, key)
@@ -218,19 +218,20 @@ def ramp_raw(units: AxisUnits, drive: Drive, key: str, rpm_per_s: float) -> int:
 async def read_units(
     drive: Drive, taught: Taught | None = None, absent: Container[str] = ()
 ) -> AxisUnits:
-    """Units of an axis with its present gearing, and what was ``taught`` of it.
+    """Units of an axis with its present gearing and the ``taught`` scales.
 
     User increments per motor revolution are ``feed/feed_revs * shaft_revs/motor_revs`` where the
-    family has a feed constant, else the encoder's resolution (608Fh or the family's own), else the
-    profile's, divided by the gear ratio. A feed constant of 0 leaves the resolution unknown (M6-L
-    with P05.05 = 0, 000:1276). Gear ratio, feed constant and resolution are optional in CiA 402-2
-    (clause 7): where the drive says that it has no such object, nothing is geared, and without feed
-    constant and resolution nothing is known. Units are those of 60A8h to 60AAh where it has them.
-    Objects that are known to be ``absent`` are not asked for.
+    family has a feed constant. Otherwise they are the resolution of the encoder (608Fh or the
+    family's own object) or of the profile, divided by the gear ratio. A feed constant of 0 leaves
+    the resolution unknown (M6-L with P05.05 = 0, 000:1276). Gear ratio, feed constant and
+    resolution are optional in CiA 402-2 (clause 7): a drive without a gear object has the ratio 1;
+    without feed constant and resolution the scale is unknown. Units are those of 60A8h to 60AAh
+    where the drive has them. Objects known to be ``absent`` are not read.
 
     Raises:
         DriveError: the objects cannot be read.
-        NotAllowed: a unit switch of the drive is not where the profile's units hold.
+        NotAllowed: a unit switch of the drive is not at the value for which the profile's units
+            hold.
     """
     await _check_unit_switches(drive)
     reported = await read_reported(drive, absent)
@@ -240,15 +241,15 @@ async def read_units(
     return AxisUnits(drive.profile.units, scales.position.raw_per_unit, scales, drive.name)
 
 
-#: Encoders with fewer or more bits than these are a misread parameter.
+#: Plausible numbers of encoder bits; any other is taken as a misread parameter.
 _ENCODER_BITS = range(10, 33)
 
 
 async def encoder_counts(drive: Drive) -> int | None:
-    """Increments per revolution of the encoder that is connected, where the drive reports them.
+    """Increments per revolution of the connected encoder; None where they are not reported.
 
-    R6L motors come with 17 or 23 bits (002:589), and its gear counts in encoder increments. A
-    family without a parameter of its own has 608Fh, if it has that.
+    R6L motors have 17 or 23 bits (002:589), and the R6L's gear counts in encoder increments. For a
+    family without a parameter of its own, 608Fh is read where the drive has it.
 
     Raises:
         DriveError: the parameter cannot be read.
@@ -270,10 +271,10 @@ async def encoder_counts(drive: Drive) -> int | None:
 
 
 async def _check_unit_switches(drive: Drive) -> None:
-    """Refuse where a parameter gives the motion objects other units than those of the profile.
+    """Check that no unit switch of the drive gives motion objects units other than the profile's.
 
     Raises:
-        NotAllowed: naming the parameter and the value at which the units hold.
+        NotAllowed: one does; the message names the parameter and the value for the profile's units.
     """
     for quirk in drive.profile.quirks:
         if quirk.kind != "unit_switch" or quirk.key is None or quirk.raw is None:

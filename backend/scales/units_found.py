@@ -1,18 +1,19 @@
-"""What a measured factor between 606Ch and 6064h most likely is, as a unit that drives have."""
+"""The usual unit of 606Ch that matches a measured factor between 606Ch and 6064h."""
 
 from __future__ import annotations
 
-#: A measured factor this near to one usual unit is that unit: a busy computer's cycles are not
-#: equally long. Where two usual units are so near, only one that is much nearer counts.
+#: Relative tolerance within which a measured factor matches a usual unit, as the cycles of a busy
+#: computer are not equally long. Where two usual units match, only one within the smaller
+#: tolerance counts.
 _NEAR, _MUCH_NEARER = 0.12, 0.02
 _TENS = (1.0, 10.0, 100.0, 1000.0, 10_000.0)
 
 
 def nearest_unit(raw_per_inc_s: float, counts_per_rev: float) -> tuple[float, str] | None:
-    """Raw 606Ch per rpm and the name of its unit, where exactly one usual unit is near; else None.
+    """Raw 606Ch per rpm and the name of its unit, where exactly one usual unit matches; else None.
 
-    ``raw_per_inc_s`` is raw 606Ch per increment per second, as `compare.measured_scale` finds it.
-    An odd factor is nobody's unit: a person states it from the data sheet.
+    ``raw_per_inc_s``: raw 606Ch per increment per second, as `compare.measured_scale` returns it.
+    Any other factor is not a usual unit: a person states it from the data sheet.
     """
     per_rpm = raw_per_inc_s * counts_per_rev / 60.0
     usual = [(counts_per_rev / 60.0, "inc/s")]

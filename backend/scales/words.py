@@ -1,4 +1,4 @@
-"""Why a loop ended a motion, in the units of the axis and as text. Made once, here."""
+"""Texts for why a loop ended a motion, in the units of the axis."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def halt_words(halt: Halted, units: AxisUnits | None) -> Text:
 
 
 def halt_remedy(halt: Halted, otherwise: Text) -> Text:
-    """What to do about it: for a contradiction its own, else what the tool says."""
+    """Remedy for a halt: its own for a contradiction, ``otherwise`` for any other cause."""
     if halt.cause is not HaltCause.CONTRADICTION or halt.value is None or halt.limit is None:
         return otherwise
     return text(_meaning(halt.value, halt.limit)).remedy() or otherwise
@@ -56,7 +56,7 @@ def _meaning(speed: float, from_position: float) -> str:
 
 
 def apart(value: float, limit: float) -> tuple[str, str]:
-    """Both with as few digits as show that they differ."""
+    """Both numbers as text, with as few digits (at least 4) as show that they differ."""
     for digits in range(4, 10):
         shown = f"{value:.{digits}g}", f"{limit:.{digits}g}"
         if shown[0] != shown[1]:

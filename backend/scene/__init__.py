@@ -1,1 +1,1 @@
-"""The bench in 3D: what turns, what slides, and where its limits are, from live positions."""
+"""The axes in 3D: turning and sliding parts at their live positions, with software limits."""

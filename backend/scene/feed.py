@@ -1,4 +1,4 @@
-"""Moves the scene with the live positions, while somebody looks at it."""
+"""Feed of the 3D scene with live positions, while a page shows it."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from drivers.link import ScopeBlock
 if TYPE_CHECKING:
     from backend.scene.view import AxisLook, Look, SceneView
 
-#: Pictures a second; viser takes about 2 % of a core for them and 1 % for each page.
+#: Period of the frames [s]; viser needs about 2 % of a core for them and 1 % for each page.
 PERIOD_S = 1 / 30
-#: Polled drives: as often as the pictures change.
+#: Period of polled drives [s], the same as that of the frames.
 POLL_S = 1 / 30
-#: How often labels and limits are looked at again.
+#: Periods for updating labels and limits [s].
 _LABELS_S = 0.25
 _LIMITS_S = 2.0
 
 
 @dataclass(slots=True)
 class _Axis:
-    """What the feed knows of one axis."""
+    """Data of one axis in the feed."""
 
     connected: ConnectedDrive
     units: AxisUnits
@@ -45,7 +45,7 @@ class _Axis:
     position_rev: float | None = None
 
     def take(self, block: ScopeBlock) -> None:
-        """The newest position of a block; never blocks."""
+        """Take the newest position of a block; never blocks."""
         if len(block.samples) and np.isfinite(value := block.samples[-1, 0]):
             key = self.connected.drive.require("position_actual")
             raw = self.connected.drive.parameter(key).to_raw(float(value))
@@ -53,9 +53,9 @@ class _Axis:
 
 
 class SceneFeed:
-    """One viser server for all who look; it is started by the first and kept until the end.
+    """One viser server for all viewers, started by the first and kept until `close`.
 
-    ``mechanics_of`` says what an axis drives.
+    ``mechanics_of`` returns the mechanics of an axis.
     """
 
     def __init__(self, bench: Bench, mechanics_of: Callable[[str], Mechanics | None]) -> None:
@@ -67,10 +67,10 @@ class SceneFeed:
         self._task: asyncio.Task[None] | None = None
 
     async def join(self) -> int:
-        """Somebody begins to look. Returns the loopback port of the scene's server.
+        """Add a viewer; return the loopback port of the scene's server.
 
         Raises:
-            OSError: it cannot be started.
+            OSError: the server cannot be started.
         """
         async with self._starting:
             if self._view is None:
@@ -81,7 +81,7 @@ class SceneFeed:
         return self._view.port
 
     async def leave(self) -> None:
-        """Somebody looks no longer; without anybody the bus is left alone."""
+        """Remove a viewer; without viewers the feed ends and polls nothing."""
         self._viewers -= 1
         if self._viewers == 0:
             await self._end()
@@ -99,7 +99,7 @@ class SceneFeed:
             task.cancel()
             await asyncio.wait([task])
 
-    # --- while somebody looks -----------------------------------------------------------
+    # --- while there are viewers --------------------------------------------------------
 
     async def _run(self, view: SceneView) -> None:
         axes: dict[str, _Axis] = {}
@@ -114,7 +114,7 @@ class SceneFeed:
             await self._release(axes)
 
     async def _follow(self, view: SceneView, axes: dict[str, _Axis], arrangement: object) -> None:
-        """Until the bench is another one, or limits changed."""
+        """Update the scene until the axis list or limits have changed."""
         loop = asyncio.get_running_loop()
         labels_at = limits_at = loop.time()
         while True:
@@ -135,7 +135,7 @@ class SceneFeed:
             view.move({d: a.position_rev for d, a in axes.items() if a.position_rev is not None})
 
     def _arrangement(self) -> object:
-        """What a change of makes the scene be built again."""
+        """Value that changes when the scene must be built again."""
         return {
             drive: (m.drive.name, id(m.axis.session), self._mechanics_of(drive))
             for drive, m in self._bench.connected_drives.items()
@@ -152,7 +152,8 @@ class SceneFeed:
                 key = connected.drive.require("position_actual")
                 streams = [s for s, _ in self._bench.scope.subscribe(drive, [key], POLL_S)]
             except DriveError:
-                # It does not answer now; shown without movement, and tried again with the limits.
+                # The drive does not answer now: it is shown without movement, and read again
+                # when the limits are updated.
                 units = AxisUnits(connected.drive.profile.units, None)
                 limits, streams = None, []
             here = connected.monitor.snapshot.values.get("position") or 0.0
@@ -171,7 +172,7 @@ class SceneFeed:
                 await self._bench.scope.unsubscribe(stream)
 
     async def _limits_changed(self, axis: _Axis) -> bool:
-        """Whether the limits are others now, or a silent drive answers again."""
+        """Whether the limits have changed, or a drive without answer answers again."""
         try:
             units = await axis.connected.axis.units()
             limits = await _software_limits(axis.connected, units)
@@ -200,7 +201,7 @@ def _looks(axes: dict[str, _Axis]) -> dict[str, AxisLook]:
 
 
 def _grow(axes: dict[str, _Axis]) -> bool:
-    """Make tracks longer where an axis without limits left them."""
+    """Extend tracks that an axis without limits has left; return whether any was."""
     grown = False
     for axis in axes.values():
         if axis.position_rev is not None:
@@ -211,8 +212,11 @@ def _grow(axes: dict[str, _Axis]) -> bool:
 
 
 def look_of(state: State, *, fresh: bool) -> Look:
-    """What the scene shows of a state: a fault, whether the motor has torque (CiA 402-2, states of
-    the FSA and supported functions), or that neither is known."""
+    """Appearance of a state in the scene.
+
+    It shows a fault, whether the motor has torque (CiA 402-2, states of the FSA and supported
+    functions), or that the state is not known.
+    """
     if not fresh:
         return "unknown"
     match state:
@@ -227,7 +231,7 @@ def look_of(state: State, *, fresh: bool) -> Look:
 
 
 def _shown(axis: _Axis) -> tuple[Look, str]:
-    """The look of an axis, and its place; empty where that is not known."""
+    """The appearance of an axis, and its position as text; empty where that is not known."""
     snapshot = axis.connected.monitor.snapshot
     look = look_of(snapshot.state, fresh=snapshot.fresh)
     if not snapshot.fresh or axis.position_rev is None:
@@ -238,9 +242,9 @@ def _shown(axis: _Axis) -> tuple[Look, str]:
 async def _software_limits(
     connected: ConnectedDrive, units: AxisUnits
 ) -> tuple[float, float] | None:
-    """Revolutions of the drive's own limits; None where it has none or they are switched off.
+    """Software limits of the drive in revolutions; None where it has none or they are off.
 
-    A range of the whole 32 bits, or an empty one, limits nothing (CiA 402-2 clause 7, 607Dh).
+    A range of the whole 32 bits, or an empty one, is no limit (CiA 402-2 clause 7, 607Dh).
     """
     drive = connected.drive
     keys = [drive.key(role) for role in ("software_limit_min", "software_limit_max")]

@@ -1,7 +1,7 @@
-"""Where the parts of an axis stand for a motor position. Pure.
+"""Positions of the parts of an axis in the scene for a motor position, without I/O.
 
-Scene units are of no scale: every linear axis gets a track of the same length, and its travel is
-mapped onto it. Angles are in radian, quaternions are (w, x, y, z).
+The scene is not to scale: every linear axis has a track of the same length, onto which its travel
+is mapped. Angles are in radian, quaternions are (w, x, y, z).
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from drivers.errors import OutOfRange
 
 #: Half the length of a track in the scene.
 HALF_TRACK = 0.9
-#: Part of a track that the range between two limits takes; the rest shows what lies beyond.
+#: Share of a track for the range between two limits; the rest shows positions beyond them.
 _LIMITED_PART = 0.8
 
 Quaternion = tuple[float, float, float, float]
@@ -22,22 +22,24 @@ Quaternion = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """The piece of travel (mm or degrees) that a track shows; ``limited`` by the drive's own
-    software limits, or only as far as the axis was seen."""
+    """Range of travel that a track shows [mm, degrees or rev].
+
+    ``limited``: it is the range of the drive's software limits; otherwise it grows with the axis.
+    """
 
     low: float
     high: float
     limited: bool
 
     def place(self, travel: float) -> float:
-        """Scene x of a travel; beyond the track's ends it stays at the end."""
+        """Scene x of a travel; limited to the ends of the track."""
         part = _LIMITED_PART if self.limited else 1.0
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         x = (travel - middle) / half * HALF_TRACK * part
         return max(-HALF_TRACK, min(HALF_TRACK, x))
 
     def showing(self, travel: float) -> Track:
-        """This track, or a longer one that shows ``travel`` as well. Limits stay where they are."""
+        """This track, or a longer one that includes ``travel``; a limited track stays the same."""
         if self.limited or self.low <= travel <= self.high:
             return self
         middle = (self.low + self.high) / 2
@@ -49,7 +51,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class Travel:
-    """How a motor revolution shows: travel of it, turns of the load for it, unit of the travel."""
+    """Effect of a motor revolution: travel, turns of the load, and the unit of travel."""
 
     per_rev: float
     load_turns_per_rev: float
@@ -57,7 +59,7 @@ class Travel:
 
 
 def travel_of(mechanics: Mechanics | None) -> Travel:
-    """What one motor revolution does; a bare shaft where nothing is known of the mechanics."""
+    """Effect of one motor revolution; a bare shaft where the mechanics are not known."""
     if mechanics is None:
         return Travel(1.0, 1.0, "rev")
     try:
@@ -68,7 +70,10 @@ def travel_of(mechanics: Mechanics | None) -> Travel:
 
 
 def track_of(travel: Travel, position_rev: float, limits_rev: tuple[float, float] | None) -> Track:
-    """The track to begin with: between the software limits, else ten revolutions around here."""
+    """The first track: between the software limits, otherwise around zero and the position.
+
+    Without limits it extends five revolutions beyond both.
+    """
     if limits_rev is not None and limits_rev[0] < limits_rev[1]:
         low, high = sorted(limit * travel.per_rev for limit in limits_rev)
         return Track(low, high, limited=True)
@@ -78,7 +83,7 @@ def track_of(travel: Travel, position_rev: float, limits_rev: tuple[float, float
 
 
 def turn(revolutions: float, axis: str) -> Quaternion:
-    """Rotation by revolutions about a scene axis; only the part of a turn matters."""
+    """Rotation by revolutions about a scene axis, as a quaternion."""
     half = math.pi * math.fmod(revolutions, 2.0)
     sine = math.sin(half)
     return (

@@ -1,7 +1,7 @@
 """The parts of the scene on a viser server, and their movement.
 
-viser is the library for the 3D scene; its server listens on loopback only and is
-reached through ours (`backend.api.scope.scene`).
+viser is the library for the 3D scene; its server listens on loopback only and is reached through
+servodeck's server (`backend.api.scope.scene`).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import viser
 from backend.scales.gear_calculator import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, Travel, turn
 
-#: Distance of two axes; the page's camera knows it too (webui/src/pages/scene/SceneFrame.tsx).
+#: Distance of two axes; the page's camera uses it too (webui/src/pages/scene/SceneFrame.tsx).
 _SPACING = 0.9
-#: Less than this is not seen: 0.007°, ten times the noise of an encoder.
+#: Smallest movement that is shown [rev]: 0.007°, ten times the noise of an encoder.
 LEAST_REV = 2e-5
 _MOTOR_X = -1.25
 _HEIGHT = 0.2
 _DARK, _STEEL, _MARK = (60, 64, 72), (150, 158, 168), (235, 120, 30)
 _ROD, _LIMIT, _HOME = (190, 196, 204), (200, 40, 40), (40, 120, 210)
-#: What an axis shows of its state, without words: viser gives all viewers one label, whatever their
-#: language. The page lists the axes with the same signs and the words of their states
-#: (webui/src/pages/scene/SceneStates.tsx). I and O are the marks of a switch (IEC 60417: 5007 and
-#: 5008).
+#: State of an axis as the scene shows it, without text: viser has one label for all viewers,
+#: whatever their language. The page lists the axes with the same signs and the names of their
+#: states (webui/src/pages/scene/SceneStates.tsx). I and O are the marks of a switch (IEC 60417:
+#: 5007 and 5008).
 Look = Literal["on", "off", "fault", "unknown"]
-#: Colours that the page uses for the same states, never alone: the sign shows it too.
+#: Colours as on the page for the same states; the sign shows the state as well.
 COLOURS: dict[Look, tuple[int, int, int]] = {
     "on": (40, 150, 70), "off": (120, 126, 136), "fault": (200, 40, 40), "unknown": (120, 126, 136),
 }  # fmt: skip
@@ -41,7 +41,7 @@ _ALONG_Y = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class AxisLook:
-    """What decides which parts an axis has."""
+    """Data that determine the parts of an axis."""
 
     name: str
     mechanics: Mechanics | None
@@ -73,7 +73,7 @@ class SceneView:
 
     def __init__(self) -> None:
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
-        # viser looks for the first free port from the given one on; 0 lets the system choose.
+        # viser takes the first free port from the given one on; with 0 the system chooses one.
         self._server = viser.ViserServer(host="127.0.0.1", port=0, label="servodeck", verbose=False)
         self._server.gui.configure_theme(show_logo=False, show_share_button=False)
         self._server.gui.main_panel.minimize()
@@ -85,11 +85,11 @@ class SceneView:
 
     @property
     def port(self) -> int:
-        """Where the server listens on the loopback interface."""
+        """Port of the server on the loopback interface."""
         return self._server.get_port()
 
     def arrange(self, axes: dict[str, AxisLook]) -> None:
-        """Make these axes the scene; those that look as before keep their parts."""
+        """Build the scene from these axes; nothing is done where they are unchanged."""
         order = list(axes)
         if order == list(self._axes) and all(self._axes[d].look == axes[d] for d in order):
             return
@@ -102,7 +102,7 @@ class SceneView:
             }
 
     def move(self, positions_rev: dict[str, float]) -> None:
-        """Put the parts of these axes where the motors are; who stands still sends nothing."""
+        """Move the parts of these axes to the motors' positions; nothing is sent at standstill."""
         with self._server.atomic():
             for drive, revolutions in positions_rev.items():
                 parts = self._axes.get(drive)
@@ -117,7 +117,7 @@ class SceneView:
                     parts.sliding.position = (x, 0.0, 0.0)
 
     def show(self, drive: str, look: Look, place: str) -> None:
-        """Colour of the motor; above it the axis's name, the sign of its state, and its place."""
+        """Set the motor's colour, and the label above it: name, sign of the state, position."""
         parts = self._axes.get(drive)
         if parts is not None:
             parts.colour(COLOURS[look])

@@ -1,9 +1,9 @@
-"""Delivers samples: cyclic blocks of a synchronous bus, or polled values with their own times.
+"""Delivery of samples: cyclic blocks of a bus, or polled values with their own times.
 
-One sampler per drive reads the union of what its subscribers want, so that a second viewer
-costs the bus nothing. Every subscriber has one bounded queue; when it is full whole blocks are
-dropped and counted in the next one. A slow subscriber therefore never disturbs the bus or the
-others.
+One sampler per drive reads the union of its subscribers' parameters, so that a second viewer of
+the same signals adds no bus load. Every subscription has one bounded queue; when it is full, whole
+blocks are dropped and counted in the next one. A slow subscriber therefore disturbs neither the bus
+nor the others.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from backend.drive.readings import Reading
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 
-#: A block is handed over at least this often.
+#: A block is delivered at least this often [s].
 FLUSH_S = 0.04
-#: Blocks that wait for a slow subscriber before dropping begins.
+#: Number of blocks that wait for a slow subscriber before blocks are dropped.
 QUEUE_BLOCKS = 50
-#: Polling is no faster than this, or a link without wire time would take a whole core.
+#: Shortest polling period [s]; a link without wire time would occupy a whole core otherwise.
 SHORTEST_PERIOD_S = 0.0005
-#: Pause between tries while the drive does not answer.
+#: Pause between attempts while the drive does not answer [s].
 RETRY_S = 0.25
 
 
 @dataclass(eq=False, slots=True)
 class Subscription:
-    """One stream of one drive's channels. ``ready`` wakes the consumer, who empties ``queue``."""
+    """One stream of one drive's channels. ``ready`` wakes the consumer, which empties ``queue``."""
 
     drive: str
     keys: tuple[str, ...]
@@ -51,10 +51,10 @@ class Subscription:
     leave: Callable[[], None] | None = None
     sampler: _Sampler | None = None
     sink: Callable[[ScopeBlock], None] | None = None
-    """Takes every block at once instead of the queue, for who must not lose any. Never blocks."""
+    """Receives every block at once in place of the queue, so that none is lost; must not block."""
 
     def take(self, block: ScopeBlock) -> None:
-        """A block of the cyclic exchange."""
+        """Take a block of the cyclic exchange."""
         self.put(block.samples, block.t0_s, block.dt_s, None, block.dropped, block.valid)
 
     def put(
@@ -91,7 +91,7 @@ class Subscription:
 
 
 class ScopeHub:
-    """Samplers of all drives. ``axis_of`` finds the axis of a drive id."""
+    """Samplers of all drives. ``axis_of`` returns the axis of a drive id."""
 
     def __init__(self, axis_of: Callable[[str], Axis]) -> None:
         self._axis_of = axis_of
@@ -100,19 +100,19 @@ class ScopeHub:
     def subscribe(
         self, drive: str, keys: Sequence[str], period_s: float
     ) -> list[tuple[Subscription, tuple[int, ...]]]:
-        """Begin to sample ``keys`` of a drive, at least ``period_s`` apart (0: as fast as it goes).
+        """Begin sampling ``keys`` of a drive, at least ``period_s`` apart (0: as fast as possible).
 
-        Returns streams with the positions in ``keys`` that each carries: what the cyclic exchange
-        of the bus carries comes with every cycle, the rest is polled.
+        Returns streams, each with the positions in ``keys`` that it carries: one for the signals
+        that the cyclic exchange carries in every cycle, and one for the others, which are polled.
 
         Raises:
-            NotAllowed: a key that the drive does not have or that no port carries.
+            NotAllowed: the drive does not have a key, or no port carries it.
         """
         axis = self._axis_of(drive)
         parameters = [axis.drive.parameter(key) for key in keys]
         for parameter in parameters:
             axis.drive.port_for(parameter)
-        # Readings and channels go by the key, also where the maker's number was asked for.
+        # Readings and channels are identified by key, also where the maker's number was given.
         keys = [parameter.key for parameter in parameters]
         session = axis.session
         cyclic = [n for n, k in enumerate(keys) if session and session.carries(axis.drive, k)]
@@ -131,7 +131,7 @@ class ScopeHub:
         subscription = Subscription(drive, tuple(keys), period_s)
         sampler = self._samplers.get(drive)
         if sampler is None or sampler.axis is not axis:
-            # A drive that was removed from the axis list and came back is another one.
+            # A drive that was removed from the axis list and added again is another object.
             sampler = self._samplers[drive] = _Sampler(axis)
         sampler.add(subscription)
         subscription.sampler = sampler
@@ -166,7 +166,7 @@ class _Sampler:
         self._subscriptions.append(subscription)
 
     def remove(self, subscription: Subscription) -> bool:
-        """Returns whether none is left."""
+        """Remove a subscription; return whether none is left."""
         with contextlib.suppress(ValueError):
             self._subscriptions.remove(subscription)
         return not self._subscriptions
@@ -192,7 +192,7 @@ class _Sampler:
             try:
                 readings = await drive.read_many(keys)
             except DriveError:
-                # The monitor shows the user why; here the gap shows as missing time.
+                # The monitor shows the cause; here it appears as a gap in time.
                 await asyncio.sleep(RETRY_S)
                 continue
             middle = (before + time.monotonic()) / 2

@@ -1,8 +1,8 @@
-"""What people keep of the scope: named set-ups, and snapshots of what it showed.
+"""Stored data of the scope: named set-ups, and snapshots of its traces.
 
 A set-up is a JSON file. A snapshot (``.sdsnap``) is 8 bytes of magic, the length of a JSON header
 (u32, little endian), the header, and then for each of its traces all times and all values as
-64-bit floats. The server only checks that it is whole; browsers write and read it.
+64-bit floats. The server only checks that it is complete; browsers write and read it.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ MOST_SETUPS, MOST_SNAPSHOTS = 200, 500
 
 
 class BadSnapshot(NotAllowed):
-    """Not a snapshot, or not whole."""
+    """Not a snapshot, or incomplete."""
 
     kind = "bad-snapshot"
 
 
 @dataclass(frozen=True, slots=True)
 class StoredSetup:
-    """A named set-up; ``modified`` in epoch seconds."""
+    """A named set-up; ``modified`` in seconds since 1970."""
 
     name: str
     modified: float
@@ -43,7 +43,7 @@ class StoredSetup:
 
 @dataclass(frozen=True, slots=True)
 class StoredSnapshot:
-    """A snapshot of the list; ``header`` is empty where the file is not usable."""
+    """A stored snapshot; ``header`` is empty where the file is not usable."""
 
     name: str
     modified: float
@@ -52,10 +52,10 @@ class StoredSnapshot:
 
 
 def snapshot_header(data: bytes, name: str = "the file") -> dict[str, Any]:
-    """The header of a snapshot whose length agrees with it.
+    """The header of a snapshot, after a check that the length of the file agrees with it.
 
     Raises:
-        BadSnapshot: anything else.
+        BadSnapshot: not a complete snapshot.
     """
     return _checked_header(data, len(data), name)
 
@@ -87,7 +87,7 @@ class ScopeStore:
     # --- set-ups ----------------------------------------------------------------------
 
     def setups(self) -> list[StoredSetup]:
-        """All set-ups by name; files that are damaged are left out."""
+        """All set-ups, sorted by name; damaged files are left out."""
         found = []
         for path in sorted((self.folder / "setups").glob(f"*{SETUP_SUFFIX}")):
             if path.name.startswith("."):
@@ -101,17 +101,18 @@ class ScopeStore:
         return found
 
     def save_setup(self, name: str, content: dict[str, Any]) -> None:
-        """Keep a set-up under a name, in place of an earlier one.
+        """Store a set-up under a name, in place of an earlier one.
 
         Raises:
-            NotAllowed: not a file name, or too many. StorageFailed: the disk.
+            NotAllowed: not a file name, or too many set-ups.
+            StorageFailed: the disk is nearly full or cannot be written.
         """
         path = self.folder / "setups" / checked_name(name, SETUP_SUFFIX)
         _check_room(path, SETUP_SUFFIX, MOST_SETUPS)
         write_atomically(path, json.dumps(content, ensure_ascii=False, indent=1).encode())
 
     def delete_setup(self, name: str) -> None:
-        """Forget a set-up.
+        """Delete a set-up.
 
         Raises:
             NotAllowed: there is none of this name.
@@ -137,10 +138,11 @@ class ScopeStore:
         return sorted(found, key=lambda each: -each.modified)
 
     def save_snapshot(self, name: str, data: bytes) -> str:
-        """Keep a snapshot; returns its file name, with a number where the name is in use.
+        """Store a snapshot; return its file name, with a number where the name is in use.
 
         Raises:
-            BadSnapshot: it is not whole. NotAllowed: not a file name, or too many.
+            BadSnapshot: it is not complete.
+            NotAllowed: not a file name, or too many snapshots.
             StorageFailed: the disk is nearly full.
         """
         snapshot_header(data, name)

@@ -1,4 +1,4 @@
-"""Scales from a drive's own unit to the unit of its axis, for traces."""
+"""Conversion factors for traces, from a drive's own unit to the unit of its axis."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from backend.drive.drive import Drive
 from backend.scales.units import AxisUnits
 from profiles.schema import Parameter
 
-#: Roles whose numbers are of the kind although their parameter may print another unit.
+#: Roles of each quantity, for parameters that may state another unit.
 _ROLES = {
     "position": (
         "position_actual",
@@ -21,8 +21,10 @@ _ROLES = {
 
 
 def axis_scale(units: AxisUnits, drive: Drive, parameter: Parameter) -> tuple[str, float | None]:
-    """Unit of the axis and the factor from the parameter's unit to it; ``("", None)`` where the
-    parameter is no position, velocity or torque, or is shown in that unit already.
+    """Unit of the axis, and the factor from the parameter's unit to it.
+
+    ``("", None)`` where the parameter is not a position, velocity or torque, or has that unit
+    already.
     """
     kind = _kind(units, drive, parameter)
     if kind is None or parameter.scale == 0 or parameter.offset:

@@ -1,4 +1,4 @@
-"""The bench: opened buses, the drives on them, and everything that watches over them."""
+"""The bench: opened buses, connected drives, and their monitoring."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ log = logging.getLogger(__name__)
 class Bench:
     """Buses and drives of one server.
 
-    ``wires`` as in `Buses`. ``names`` are those of its drives by bus URL and station, for who
-    gives none. ``state_folder`` keeps the list of drives over restarts, and what `Records` keeps.
+    ``wires`` as in `Buses`. ``names``: default names of drives by bus URL and station.
+    ``state_folder`` holds the list of drives across restarts, and the data of `Records`.
     """
 
     def __init__(
@@ -75,10 +75,10 @@ class Bench:
         self.on_job: list[Callable[[Job], None]] = []
         self.on_drives: list[Callable[[], None]] = []
         self.motion = Motion(self)
-        #: Who may move which axis now; every drive of the bench asks here.
+        #: Motion authority shared by all drives of the bench.
         self.authority = MotionAuthority()
         self.jobs = JobRunner(self._job_changed, self.motion.permit, self.motion.granted)
-        #: Bus and station of drives that left the bench and never took their stop.
+        #: Bus and station of removed drives to which a stop was never delivered.
         self._unstopped: set[tuple[str, int]] = set()
         self.exchanges = Exchanges(self)
         self.sessions = self.exchanges.running
@@ -104,16 +104,17 @@ class Bench:
     ) -> CyclicSession:
         """Exchange process data with all drives of a bus.
 
-        ``by_speed`` as in `CyclicSession`. ``in_job_of`` is the drive whose own job asks for it.
+        ``by_speed`` as in `CyclicSession`. ``in_job_of``: drive whose own job requests the
+        exchange.
 
         Raises:
             NotAllowed: no drives, no cyclic data on this bus, or a drive refuses.
-            Busy: it runs already, or a drive is moving.
+            Busy: the exchange runs already, or a drive is moving.
         """
         return await self.exchanges.start(url, cycle_s, by_speed=by_speed, in_job_of=in_job_of)
 
     async def stop_cyclic(self, url: str) -> None:
-        """End the exchange of a bus; what moves is braked. Does nothing where none runs.
+        """End the exchange of a bus; moving axes are braked. Does nothing where none runs.
 
         Raises:
             Busy: it is just being started or ended.
@@ -136,11 +137,12 @@ class Bench:
     async def connect(
         self, url: str, station: int, profile: str, name: str = "", *, found: Found | None = None
     ) -> ConnectedDrive:
-        """Make a station a drive of the bench.
+        """Add the drive at a station to the bench.
 
         Raises:
-            Busy: another drive uses this station. LinkLost: the bus cannot be opened.
-            NotAllowed: no such profile, or one of drives that have no such port.
+            Busy: another drive uses this station.
+            LinkLost: the bus cannot be opened.
+            NotAllowed: no such profile, or its drives have no port for this kind of bus.
         """
         link = await self.buses.open(url)
         self._require_free(link, url, station)
@@ -163,12 +165,14 @@ class Bench:
         station: int,
         check: Callable[[Drive, Port], Awaitable[None]] | None = None,
     ) -> ConnectedDrive:
-        """Connect a drive over a second bus, so that each parameter goes the way that carries it.
+        """Connect a drive over a second bus, so that each parameter uses the port that carries it.
 
-        ``check`` looks at the port before it is used, and raises what speaks against it.
+        ``check`` is called with drive and port before the port is used, and raises where it must
+        not.
 
         Raises:
-            NotAllowed: its family has no such link. Busy: the station is in use.
+            NotAllowed: its family has no such link.
+            Busy: the station is in use, or the drive is moved.
         """
         connected = self.connected(drive_id)
         drive = connected.drive
@@ -240,7 +244,7 @@ class Bench:
         return connected
 
     def _may_turn(self, drive_id: str) -> bool:
-        """Whether something has been allowed to turn this axis, or it is being stopped."""
+        """Whether this axis may turn: it is moved by a job, under a grant, or being stopped."""
         connected = self.connected_drives.get(drive_id)
         if connected is None:
             return True
@@ -248,7 +252,7 @@ class Bench:
         return moved or self.authority.grant_of(drive_id) is not None
 
     async def remove(self, drive_id: str) -> None:
-        """Take a drive off the bench.
+        """Remove a drive from the bench.
 
         Raises:
             Busy: it is moving, or another axis moves through the exchange that would end with it.
@@ -258,7 +262,7 @@ class Bench:
         self.motion.require_idle(connected)
         self.exchanges.require_idle_but(connected)
         with self.motion.parting(connected):
-            # What STOP still has to do is done, and whoever pressed it gets the verdict.
+            # A STOP in progress is completed, and its caller receives the verdict.
             await self.motion.standstill([drive_id])
             await self.motion.end_watches(drive_id)
             await self.motion.let_go_of(connected)
@@ -271,7 +275,7 @@ class Bench:
                     (self.buses.url_of(p), p.station) for p in connected.drive.ports
                 )
             del self.connected_drives[drive_id]
-            # Pending restores stand first on an axis' pages: whoever removes it has read them.
+            # Pending restores are shown first on an axis' pages: whoever removes it has read them.
             connected.drive.pending_restores.settle(
                 [entry.key for entry in connected.drive.pending_restores.entries]
             )
@@ -280,10 +284,10 @@ class Bench:
         self.drives_changed()
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> ConnectedDrive:
-        """Change name or notes; None leaves them.
+        """Change name or notes; None leaves them unchanged.
 
         Raises:
-            StorageFailed: they could not be stored and are as before.
+            StorageFailed: they could not be stored and are unchanged.
         """
         connected = self.connected(drive_id)
         drive = connected.drive
@@ -315,7 +319,8 @@ class Bench:
             try:
                 listener(job)
             except Exception:
-                # The next one may be who stops it, and the job itself must come to its end.
+                # A failing listener must not prevent the others from acting, nor the job from
+                # ending.
                 log.exception("a change of the job %s could not be known", job.id)
 
     def _lease_changed(self, drive_id: str) -> None:
@@ -323,28 +328,28 @@ class Bench:
         self.drives_changed()
 
     def tell(self, line: Text, connected: ConnectedDrive, level: Level = "info") -> None:
-        """A line of the journal about a drive; the list of drives may have changed with it."""
+        """Add a journal line about a drive, and notify that the list of drives may have changed."""
         self.journal.add(line, level=level, drive=connected.drive.id)
         self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
-        """Name of a drive, or its id where it is not on the bench."""
+        """Name of a drive; its id where it is not connected."""
         connected = self.connected_drives.get(drive_id)
         return connected.drive.name if connected is not None else drive_id
 
     def drives_changed(self) -> None:
-        """Tell everybody that the list of drives and buses may look different now."""
+        """Notify all listeners that the list of drives or buses may have changed."""
         for listener in self.on_drives:
             listener()
 
     async def accept_identity(self, drive_id: str) -> ConnectedDrive:
-        """The user says that the drive at this place is the right one."""
+        """Accept the drive that answers at this station, as confirmed by the user."""
         connected = self.connected(drive_id)
         drive = connected.drive
         serial = await read_serial(drive)
         drive.found = replace(drive.found or Found(drive.ports[0].station), serial=serial)
         drive.identity_warning = None
-        # What was said of the drive that was here before is no matter of this one.
+        # Scales stated for the earlier drive do not hold for this one.
         connected.axis.teach(None)
         connected.axis.small_moves = None
         record = self.axis_records.get(drive_id)
@@ -357,10 +362,10 @@ class Bench:
         self.drives_changed()
         return connected
 
-    # --- over restarts ----------------------------------------------------------------
+    # --- across restarts --------------------------------------------------------------
 
     def _remember(self) -> None:
-        """Store the list of drives; where that fails the bench works on, and says so."""
+        """Store the list of drives; a failure is logged and does not stop the bench."""
         try:
             self._save()
         except StorageFailed as error:
@@ -380,7 +385,7 @@ class Bench:
         )
 
     async def restore(self) -> None:
-        """Connect the drives of the last session; those that cannot be are logged and kept out."""
+        """Connect the drives of the last session; those that fail are logged and left out."""
         await self.records.open()
         saved, problems = self._list.load()
         for problem in problems:
@@ -404,7 +409,7 @@ class Bench:
                 self.reconnection.returned(connected.drive.id)
 
     async def close(self) -> None:
-        """Stop what moves, then let go of every bus; what fails keeps nothing else from its end."""
+        """Stop all motion, then close every bus; a failure does not prevent the other steps."""
         async with contextlib.AsyncExitStack() as then:
             then.push_async_callback(self.records.close)
             then.push_async_callback(self._close_buses)

@@ -1,4 +1,4 @@
-"""The buses of a bench: opened, searched for drives, and closed."""
+"""The buses of a bench: opening, scanning for drives, and closing."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 class Buses:
-    """For one bench. ``opened`` holds the link of each open bus by its URL.
+    """Buses of one bench. ``opened`` holds the link of each open bus by its URL.
 
-    ``wires`` are the wires of a demo bench: URLs such as ``mlink://virtual0`` and what makes
-    their links.
+    ``wires``: wires of a demo bench, as factories of their links by URL such as
+    ``mlink://virtual0``.
     """
 
     def __init__(self, bench: Bench, wires: Mapping[str, Callable[[], Link]]) -> None:
@@ -35,11 +35,11 @@ class Buses:
         self._opening = asyncio.Lock()
 
     async def open(self, url: str) -> Link:
-        """The opened bus of this URL; opens it on first use.
+        """The link of the bus of this URL; opened at first use.
 
         Raises:
-            LinkLost: it cannot be opened. NotAllowed: no such kind of bus, or EtherCAT on the
-                office's port.
+            LinkLost: it cannot be opened.
+            NotAllowed: no such kind of bus, or EtherCAT on the office port.
         """
         async with self._opening:
             link = self.opened.get(url)
@@ -59,7 +59,8 @@ class Buses:
         """Close a bus that no drive uses.
 
         Raises:
-            Busy: drives use it. NotAllowed: it is not open.
+            Busy: drives use it.
+            NotAllowed: it is not open.
         """
         users = [
             m.drive.name
@@ -75,13 +76,13 @@ class Buses:
         self._bench.drives_changed()
 
     def urls_of(self, drive: Drive) -> list[str]:
-        """The URLs of the open buses that this drive is reached over."""
+        """URLs of the open buses over which this drive is reached."""
         return [
             url for url, link in self.opened.items() if any(p.link is link for p in drive.ports)
         ]
 
     def url_of(self, port: Port) -> str:
-        """The URL a port was opened by, as the user knows it."""
+        """The URL by which the bus of a port was opened, as entered by the user."""
         return next((u for u, link in self.opened.items() if link is port.link), port.link.url)
 
     async def scan(
@@ -92,11 +93,11 @@ class Buses:
         *,
         stop_after_first: bool = False,
     ) -> list[Found]:
-        """Look for drives on a bus.
+        """Scan a bus for drives.
 
         Raises:
             LinkLost: the bus cannot be opened.
-            Busy: a drive of it is moving; a scan may reset what it finds.
+            Busy: a drive on it is moving; a scan may reset the drives.
         """
         link = await self.open(url)
         for connected in self._bench.connected_drives.values():
@@ -126,6 +127,6 @@ class Buses:
             self._bench.reconnection.returned(drive.id)
 
     async def close_all(self) -> None:
-        """Let go of every bus; one that fails keeps no other open."""
+        """Close every bus; a failure does not keep others open."""
         links = self.opened.values()
         await asyncio.gather(*(link.close() for link in links), return_exceptions=True)

@@ -1,4 +1,4 @@
-"""A drive of the bench with what belongs to it."""
+"""A connected drive with its axis and monitor."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from backend.station.monitor import Monitor
 
 
 class ConnectedDrive:
-    """A drive of the bench with its axis and monitor."""
+    """A drive of the axis list with its axis and monitor."""
 
     def __init__(self, drive: Drive, axis: Axis, monitor: Monitor) -> None:
         self.drive = drive

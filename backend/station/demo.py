@@ -1,4 +1,4 @@
-"""The demo bench: virtual drives on real wires, in processes of their own."""
+"""The demo bench: virtual drives on real wires, in separate processes."""
 
 from __future__ import annotations
 
@@ -32,20 +32,19 @@ if TYPE_CHECKING:
 
 #: A fault that needs no motion and that a reset clears.
 TRAINING_FAULT = "under_voltage"
-#: Searches of a bus until all of its drives have answered.
+#: Largest number of scans of a bus until all of its drives have answered.
 _TRIES = 10
-#: Between them: the segment of a busy computer answers late after its start.
+#: Pause between scans [s]: on a busy computer the segment answers late after its start.
 _PAUSE_S = 1.0
 
 
 class DemoBench:
-    """Starts the wires of a bench file and knows their real addresses.
+    """Starts the wires of a bench file and holds their real addresses.
 
-    ``segment_options`` go to the EtherCAT segments (see drivers.virtual.wires.ethercat). With
-    ``steady`` a cycle that comes late because the computer is busy is not late for the drives.
-    ``defects`` are planted in addition to those of the file, each as ``AXIS=DEFECT``.
-
-    Use as a context manager; leaving it ends all virtual drives.
+    ``segment_options``: options of the EtherCAT segments (see drivers.virtual.wires.ethercat). With
+    ``steady`` a cycle that is late because the computer is busy does not count as late in the
+    drives. ``defects``: defects in addition to those of the file, each as ``AXIS=DEFECT``.
+    Used as a context manager; its exit ends all virtual drives.
     """
 
     def __init__(
@@ -68,25 +67,25 @@ class DemoBench:
             self._file = folder / "bench.json"
         self._nvm = nvm
         self._host: subprocess.Popen[str] | None = None
-        self._asking = threading.Lock()  # an answer belongs to the command sent before it
+        self._asking = threading.Lock()  # keeps each answer with its command
         self.spec: BenchSpec = load_bench(self._file)
-        #: The bench's bus URLs, and how to open the wire behind each.
+        #: Factories of the links, by bus URL of the bench.
         self.wires: dict[str, Callable[[], Link]] = {}
-        #: The same wires as other programs name them.
+        #: Addresses of the same wires for other programs, by bus URL.
         self.addresses: dict[str, str] = {}
         self.segments: dict[str, VirtualSegment] = {}
         self._namespaces: list[Namespace] = []
-        #: Sentences for the user about what could not be started.
+        #: Messages for the user about wires that could not be started.
         self.problems: list[str] = []
 
     @property
     def names(self) -> dict[tuple[str, int], str]:
-        """What the bench file calls its drives, by bus URL and station of each port."""
+        """Names of the drives in the bench file, by bus URL and station of each port."""
         return {port: axis.name for axis in self.spec.axis for port in axis.ports}
 
     @property
     def planted(self) -> tuple[tuple[str, Text], ...]:
-        """Names of axes, and the words of a defect that each of them has."""
+        """Pairs of axis name and description, one for each defect of an axis."""
         return tuple(
             (axis.name, DEFECT_WORDS[defect]) for axis in self.spec.axis for defect in axis.defects
         )
@@ -95,7 +94,7 @@ class DemoBench:
         """Start the virtual drives and wait until their wires exist.
 
         Raises:
-            LinkLost: a wire could not be made; the message states the reason.
+            LinkLost: a wire could not be created; the message states the reason.
         """
         self._folder.mkdir(parents=True, exist_ok=True)
         arguments = ["--bench", str(self._file), "--folder", str(self._folder)]
@@ -125,9 +124,10 @@ class DemoBench:
             self._start_segment(url, number)
 
     def _start_segment(self, url: str, number: int) -> None:
-        """A private network with the segment at one end of its cable.
+        """Start a private network with the segment at one end of its cable.
 
-        Where the system forbids such networks the rest of the bench runs, and the user is informed.
+        Where the system does not permit such networks, the segment is left out and reported in
+        `problems`.
         """
         master, slave = f"ec{number}m", f"ec{number}s"
         try:
@@ -145,7 +145,7 @@ class DemoBench:
             arguments += ["--nvm", str(folder)]
         self.segments[url] = VirtualSegment.start(slave, arguments, namespace)
         launcher = namespace.command(())
-        # Where time follows the frames, a late reply is awaited.
+        # In lockstep the drives' time advances with the frames, so a late reply is awaited.
         patient = self._steady or "--lockstep" in self._segment_options
         self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"
         self.wires[url] = partial(
@@ -153,10 +153,11 @@ class DemoBench:
         )
 
     def command(self, **command: object) -> object:
-        """Cause trouble: see drivers.virtual.host.
+        """Send a command to the virtual drives and return its result; see drivers.virtual.host.
 
         Raises:
-            ValueError: the command is refused. LinkLost: the process has ended.
+            ValueError: the command is refused.
+            LinkLost: the process has ended.
         """
         if self._host is None or self._host.stdin is None:
             raise LinkLost("station.virtual-drives-not-run")
@@ -172,10 +173,11 @@ class DemoBench:
         return answer.get("result")
 
     def cause_fault(self, url: str, station: int) -> None:
-        """Report an under-voltage in the virtual drive at a station, for training.
+        """Cause an under-voltage fault in the virtual drive at a station, for training.
 
         Raises:
-            NotAllowed: no drive of the bench is there. ValueError: the drive refuses.
+            NotAllowed: no drive of the bench is at this station.
+            ValueError: the drive refuses.
             LinkLost: the virtual drives have ended.
         """
         segment = self.segments.get(url)
@@ -229,7 +231,7 @@ class DemoBench:
 
 
 def mechanics_of(axis: AxisSpec) -> Mechanics | None:
-    """What an axis of a bench file moves; None where the file does not say.
+    """Mechanics of an axis of a bench file; None where the file does not state them.
 
     Raises:
         NotAllowed: the mechanics are not valid; the message names the field.
@@ -252,8 +254,8 @@ def mechanics_of(axis: AxisSpec) -> Mechanics | None:
 async def connect_axes(bench: Bench, spec: BenchSpec) -> list[str]:
     """Connect the axes that a bench file marks as connected, in the order of the file.
 
-    A bench with drives is left as it is: its list was kept from an earlier run. Nothing is
-    enabled and nothing is written to a drive. An axis that cannot be connected is logged.
+    A bench that already has drives, from an earlier run, is left unchanged. Nothing is enabled and
+    nothing is written to a drive. An axis that cannot be connected is logged.
 
     Returns:
         The ids of the axes that were connected.
@@ -278,7 +280,7 @@ async def connect_axes(bench: Bench, spec: BenchSpec) -> list[str]:
 
 
 async def _search(bench: Bench, url: str, stations: list[int]) -> list[Found]:
-    """What answers; a busy computer may miss a drive, so it is asked again, but not often."""
+    """Drives that answer; scanned up to `_TRIES` times, as a busy computer may miss a drive."""
     seen: list[Found] = []
     for attempt in range(_TRIES):
         if attempt:

@@ -1,4 +1,4 @@
-"""A profile from a maker's file or from a drive's own dictionary."""
+"""Import of a profile from a maker's file or from a drive's own object dictionary."""
 
 from __future__ import annotations
 
@@ -23,40 +23,40 @@ from profiles.importer.dictionary import DictionaryEntry
 from profiles.importer.process import DescriptionTask, FileTask
 from profiles.loader import user_folder
 
-#: An import that takes longer is ended: a file of the greatest size takes a few seconds.
+#: Time limit of an import [s]: the largest permitted file takes a few seconds.
 IMPORT_LIMIT_S = 120.0
-#: Address space of an import: a description of 4 MiB takes 90 MiB, and 32 MiB is the largest one.
+#: Address space of an import [MiB]: a file of 4 MiB takes 90 MiB, and 32 MiB is the largest file.
 IMPORT_LIMIT_MIB = 768
-#: Imports at once, whoever asks: each may use a processor and that memory.
+#: Imports at the same time, of all users: each may use a processor and that memory.
 IMPORTS_AT_ONCE = 2
 _at_once: dict[asyncio.AbstractEventLoop, asyncio.Semaphore] = {}
-#: Object 1021h "Store EDS" and 1022h, its format; 0 is plain text (CiA 301 clause 7.5.2.19).
+#: Objects 1021h "Store EDS" and 1022h "Store format"; 0: plain text (CiA 301 clause 7.5.2.19).
 _STORED_EDS = Address(0x1021, 0, "OCTETS")
 _STORED_FORMAT = Address(0x1022, 0, "UINT16")
 
 
 class BadDescription(NotAllowed):
-    """A description file or dictionary of which no profile can be made, and why."""
+    """No profile can be made from a description file or dictionary; the message states why."""
 
     kind = "bad-description"
 
 
 class Work(Protocol):
-    """What is done in the process of an import, and pickled on its way there."""
+    """Task of an import process; it is pickled to be passed there."""
 
     def run(self) -> dict[str, object]:
-        """The answer, as JSON carries it."""
+        """Carry out the task; the answer consists of JSON values."""
         ...
 
 
 async def import_in_process(
     task: Work, limit_s: float = IMPORT_LIMIT_S, limit_mib: int = IMPORT_LIMIT_MIB
 ) -> dict[str, Any]:
-    """Carry out an import in a process of its own, which ends with the caller's task.
+    """Carry out an import in a separate process, which ends with the caller's task.
 
     Raises:
-        BadDescription: nothing usable in it, the name is in use, or it takes too long or more
-            memory than an import may use.
+        BadDescription: nothing usable in the file, the name is in use, or the import exceeds its
+            limit of time or memory.
     """
     loop = asyncio.get_running_loop()
     async with _at_once.setdefault(loop, asyncio.Semaphore(IMPORTS_AT_ONCE)):
@@ -89,13 +89,13 @@ async def _imported_apart(task: Work, limit_s: float, limit_mib: int) -> dict[st
 async def drive_task(
     link: Link, found: Found, name: str, progress: Progress
 ) -> FileTask | DescriptionTask:
-    """What a drive reports of its own objects, ready to be made a profile called ``name``.
+    """Task that makes a profile called ``name`` from a drive's report of its own objects.
 
-    An EtherCAT drive lists them (SDO information), a CANopen drive may carry its own EDS (1021h).
+    An EtherCAT drive lists them (SDO information); a CANopen drive may hold its own EDS (1021h).
 
     Raises:
-        NotAllowed: this drive, or a drive on this kind of bus, shows nothing.
-        ImportFailed: it offers a list, and nothing is in it.
+        NotAllowed: this drive, or this kind of bus, offers no description.
+        ImportFailed: the drive offers a list, but it is empty.
     """
     if link.traits.description == "stored_eds":
         eds = await _stored_eds(link, found)
@@ -116,11 +116,11 @@ async def drive_task(
 async def profile_of_drive(
     link: Link, found: Found, name: str, progress: Progress
 ) -> ImportedProfile:
-    """A generic profile called ``name`` of the drive that a scan found, not yet written.
+    """A generic profile called ``name`` for a drive that a scan found; not yet stored.
 
     Raises:
         NotAllowed: see `drive_task`.
-        ImportFailed: nothing in what this drive reports can be used.
+        ImportFailed: nothing that this drive reports can be used.
     """
     task = await drive_task(link, found, name, progress)
     if isinstance(task, FileTask):
@@ -129,10 +129,10 @@ async def profile_of_drive(
 
 
 async def _stored_eds(link: Link, found: Found) -> bytes:
-    """The EDS that a CANopen drive carries in itself.
+    """The EDS that a CANopen drive holds in 1021h.
 
     Raises:
-        NotAllowed: it carries none, or one that is packed in the maker's own way.
+        NotAllowed: it holds none, or one in a maker-specific format.
     """
     remedy = "station.import-eds-or-generic"
     try:
@@ -147,7 +147,7 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
     try:
         packed = int.from_bytes(await link.read(found.station, _STORED_FORMAT), "little")
     except Rejected:
-        packed = 0  # plain text is what 1021h holds where nothing else is said
+        packed = 0  # without 1022h, 1021h holds plain text
     if packed:
         raise NotAllowed(
             "station.drive-station-carries-eds", remedy=remedy, station=found.station, packed=packed
@@ -158,7 +158,7 @@ async def _stored_eds(link: Link, found: Found) -> bytes:
 def dictionary_entries(
     reported: Sequence[Described],
 ) -> list[DictionaryEntry]:
-    """What the drive reported, each entry with the name of its object."""
+    """Dictionary entries as the drive reported them, each with the name of its object."""
     objects = {item.index: item for item in reported if isinstance(item, ObjectInfo)}
     entries = []
     for item in reported:

@@ -1,8 +1,8 @@
-"""Why a station does not reach Operational, and the trial of another setting of its bring-up.
+"""Diagnosis of a station that does not reach Operational, and trials of bring-up settings.
 
 A trial writes no parameter and enables nothing: the exchange of one station is started with a
-profile that differs in one setting, and ended; then the profile is as it was. What a person keeps
-afterwards holds as long as the drive stays connected, and is stored nowhere.
+profile that differs in one setting, and ended; then the earlier profile is used again. A setting
+that a person keeps afterwards holds as long as the drive stays connected, and is not stored.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """One station that was taken to Operational; ``refusal`` is what the start raised."""
+    """Result of taking one station to Operational; ``refusal``: error of the start, if any."""
 
     station: int
     reached: bool
@@ -44,11 +44,11 @@ class Examined:
 async def examined(link: Link, station: int, cycle_factor: int = 1) -> Examined:
     """Take one station to Operational and back, without enabling it.
 
-    ``cycle_factor`` multiplies the cycle of the exchange, which is 1 ms on EtherCAT and 10 ms on
-    CANopen.
+    ``cycle_factor`` multiplies the cycle time of the exchange, which is 1 ms on EtherCAT and 10 ms
+    on CANopen.
 
     Raises:
-        NotAllowed: the bus has no doctor, or no cyclic exchange.
+        NotAllowed: the bus has no diagnosis, or no cyclic exchange.
     """
     cyclic = link.cyclic
     if cyclic is None or link.doctor is None:
@@ -66,7 +66,7 @@ async def examined(link: Link, station: int, cycle_factor: int = 1) -> Examined:
             refusal = error
         found = await link.doctor.examination(station, refusal)
     finally:
-        # A start that timed out or was cancelled may still come to its end.
+        # A start that timed out or was cancelled may still complete later.
         with contextlib.nullcontext() if started else contextlib.suppress(DriveError):
             await cyclic.stop()
     return Examined(station, found.reached, refusal, found.causes)
@@ -83,7 +83,7 @@ async def tried(link: Link, station: int, profile: Profile, trial: Trial) -> Exa
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A trial that holds for a connected drive; ``before`` is its profile without it."""
+    """A trial setting kept for a connected drive; ``before``: its profile without the setting."""
 
     trial: Trial
     before: Profile
@@ -99,10 +99,10 @@ class Doctor:
         self._kept: dict[tuple[str, int], Kept] = {}
 
     async def examination(self, url: str, station: int) -> tuple[Examination, Sequence[Trial]]:
-        """A station as it is, and what can be tried on it; changes no state of a drive.
+        """Diagnosis of a station, and the trials possible on it; changes no state of a drive.
 
         Raises:
-            NotAllowed: the bus is not open or has no doctor.
+            NotAllowed: the bus is not open or has no diagnosis.
         """
         link = self._link(url)
         if link.doctor is None:
@@ -110,26 +110,26 @@ class Doctor:
         found = await link.doctor.examination(station)
         connected = self._drive_at(url, station)
         if connected is None or self.kept(url, station) is not None:
-            return found, ()  # one at a time: what is kept can be undone first
+            return found, ()  # one setting at a time: the kept one must be undone first
         profile = connected.drive.profile
         offered = trials(found.causes, profile)
         self._offered[url, station] = profile, offered
         return found, offered
 
     def kept(self, url: str, station: int) -> Kept | None:
-        """The setting that is kept there; None where the drive has the profile it came with."""
+        """The setting that is kept at a station; None where the drive has its original profile."""
         kept, connected = self._kept.get((url, station)), self._drive_at(url, station)
         if kept is None or connected is None or connected.drive.profile is not kept.trial.profile:
             return None
         return kept
 
     async def run(self, url: str, station: int, setting: str, after: str) -> Examined:
-        """Try a setting that the last examination offered; afterwards all is as it was.
+        """Try a setting that the last examination offered, and undo it afterwards.
 
         Raises:
             NotAllowed: it was not offered, no drive is connected there, or a drive is enabled.
-            DriveError: another drive of the bus does not answer whether it is enabled.
-            Busy: a drive of the bus moves, or its exchange runs or is being changed.
+            DriveError: another drive on the bus does not report whether it is enabled.
+            Busy: a drive on the bus moves, or the exchange runs or is being changed.
         """
         link, place = self._link(url), (url, station)
         connected = self._require_drive(url, station)
@@ -147,10 +147,10 @@ class Doctor:
         return result
 
     def keep(self, url: str, station: int, setting: str, after: str) -> Kept:
-        """Use a setting from now on that has just taken this station to Operational.
+        """Keep a setting with which a trial has just taken this station to Operational.
 
         Raises:
-            NotAllowed: it was not tried, did not reach Operational, or is the cycle, which is
+            NotAllowed: it was not tried, did not reach Operational, or is the cycle time, which is
                 chosen where the exchange is started.
             Busy: the exchange runs.
         """
@@ -173,10 +173,11 @@ class Doctor:
         return kept
 
     def undo(self, url: str, station: int) -> None:
-        """Use the profile again that the drive was connected with.
+        """Use the profile again with which the drive was connected.
 
         Raises:
-            NotAllowed: nothing is kept there. Busy: the exchange runs.
+            NotAllowed: nothing is kept there.
+            Busy: the exchange runs.
         """
         kept, connected = self.kept(url, station), self._drive_at(url, station)
         if kept is None or connected is None:
@@ -194,11 +195,11 @@ class Doctor:
         connected.drive.profile = profile
 
     async def _require_disabled(self, url: str, tried: ConnectedDrive) -> None:
-        """No drive of the bus has power on its motor: the start of an exchange resets them all.
+        """Check that no motor on the bus has power, as the start of an exchange resets all drives.
 
         Raises:
-            NotAllowed: one has. DriveError: a drive other than the one ``tried`` does not answer,
-                so that its state is not known.
+            NotAllowed: one has.
+            DriveError: a drive other than ``tried`` does not answer, so its state is not known.
         """
         for connected in self._on(url):
             try:

@@ -1,4 +1,4 @@
-"""The list of a bench's drives in a file, so that a restarted server knows them."""
+"""File with the list of a bench's drives, to connect them again after a restart."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class SavedPort:
-    """Where a drive is reached: bus URL and station address on it."""
+    """Port of a drive: bus URL and station address."""
 
     url: str
     station: int
@@ -25,7 +25,7 @@ class SavedPort:
 
 @dataclass(frozen=True, slots=True)
 class SavedDrive:
-    """A drive as it is in the list; the first port is the one it was connected by."""
+    """A drive in the list; the first port is the one by which it was connected."""
 
     name: str
     profile: str
@@ -42,19 +42,19 @@ _DRIVE = TypeAdapter(SavedDrive)
 
 
 class DriveList:
-    """The file of this list."""
+    """The list of drives in its file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def store(self, drives: Iterable[SavedDrive]) -> None:
-        """Replace the file, whole or not at all."""
+        """Replace the file atomically."""
         content = {"version": VERSION, "drives": [asdict(drive) for drive in drives]}
         written = json.dumps(content, indent=2, ensure_ascii=False)
         write_atomically(self._path, written.encode())
 
     def load(self) -> tuple[list[SavedDrive], list[Text]]:
-        """The drives, and a message for each entry that is of no use; nothing where no file is."""
+        """The drives, and a message for each invalid entry; both empty where there is no file."""
         try:
             content = json.loads(self._path.read_text("utf-8"))
             entries = content["drives"]

@@ -1,4 +1,4 @@
-"""Stored measurements evaluated again, and compared with what was concluded at the time."""
+"""Evaluation of stored measurements again, and comparison with the stored result."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ from backend.response_import import stored as response_import
 from backend.tools.registry import BY_KIND
 from drivers.texts.message import reason_of
 
-#: Numbers nearer than this share are the same: another computer sums in another order.
+#: Relative tolerance of equal numbers, as another computer may sum in another order.
 _SAME = 1e-6
-#: Below this nothing is reported about a difference; phases and decibels are of the order of one.
+#: Absolute tolerance of equal numbers; phases and decibels are of the order of one.
 _NOTHING = 1e-9
 _NAMED_AT_MOST = 5
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """``result`` is the tool's JSON form. ``agrees`` is None where no conclusion was stored;
-    ``differences`` names fields, at most five."""
+    """Result of an evaluation and its comparison with the stored one.
+
+    ``result``: the tool's result in JSON form. ``agrees``: None where no result was stored.
+    ``differences``: names of differing fields, at most five.
+    """
 
     result: dict[str, object]
     agrees: bool | None
@@ -29,11 +32,11 @@ class Evaluation:
 
 
 def evaluate(measurement: Measurement) -> Evaluation:
-    """Evaluate the raw data again and compare.
+    """Evaluate the raw data again and compare with the stored result.
 
     Raises:
         BadMeasurement: of a kind that cannot be evaluated, or not complete.
-        NotAllowed: the data support no answer.
+        NotAllowed: the data do not permit a result.
     """
     result = recompute(measurement)
     stored = measurement.meta.get("result")
@@ -44,11 +47,11 @@ def evaluate(measurement: Measurement) -> Evaluation:
 
 
 def recompute(measurement: Measurement) -> dict[str, object]:
-    """Evaluate the raw data again; the tool's JSON form.
+    """Evaluate the raw data again; the tool's result in JSON form.
 
     Raises:
         BadMeasurement: of a kind that cannot be evaluated, or not complete.
-        NotAllowed: the data support no answer.
+        NotAllowed: the data do not permit a result.
     """
     arrays, meta = measurement.arrays, measurement.meta
     try:
@@ -67,7 +70,7 @@ def recompute(measurement: Measurement) -> dict[str, object]:
 
 
 def _differences(then: object, now: object, path: str) -> Iterator[str]:
-    """Fields of what was concluded whose value is another now. New fields are none."""
+    """Paths of fields of the stored result that differ now; new fields do not count."""
     if isinstance(then, Mapping) and isinstance(now, Mapping):
         for name, value in then.items():
             if name in now:

@@ -1,4 +1,4 @@
-"""The cyclic exchanges of a bench: which run, and who may change or end them when."""
+"""The cyclic exchanges of a bench: which run, and when they may be changed or ended."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Exchanges:
-    """For one bench. ``running`` holds the session of each bus by its URL."""
+    """Cyclic exchanges of one bench. ``running`` holds the session of each bus by its URL."""
 
     def __init__(self, bench: Bench) -> None:
         self.running: dict[str, CyclicSession] = {}
@@ -50,8 +50,8 @@ class Exchanges:
         self._require_settled(url)
         if (old := self.running.get(url)) is not None and old.running:
             raise Busy("station.cyclic-exchange-runs-already", url=url)
-        # From here on nothing else may change it, nor begin to move: not even while the old one
-        # ends.
+        # From here on nothing else may change the exchange or begin a motion, not even while the
+        # old exchange ends.
         with self._changing_of(url):
             await self._end(url)
             session = CyclicSession(link, [m.drive for m in users], by_speed)
@@ -64,7 +64,7 @@ class Exchanges:
         return session
 
     async def stop(self, url: str) -> None:
-        """End the exchange of a bus; what moves is braked. Does nothing where none runs.
+        """End the exchange of a bus; moving axes are braked. Does nothing where none runs.
 
         Raises:
             Busy: it is just being started or ended.
@@ -74,13 +74,13 @@ class Exchanges:
             await self._end(url)
 
     async def stop_when_idle(self, url: str, session: CyclicSession, but: str) -> None:
-        """End this exchange, but never under an axis that somebody else moves through it.
+        """End this exchange, but not while another job moves an axis through it.
 
-        Returns at once where one does; it is then ended when nothing moves any more, unless
-        somebody has ended it by then. ``but`` is the drive whose own job ends it.
+        In that case it returns at once, and the exchange is ended when no axis moves any more,
+        unless it has been ended by then. ``but``: drive whose own job ends the exchange.
 
         Raises:
-            DriveError: it does not end in order.
+            DriveError: the exchange does not end without an error.
         """
         if self.running.get(url) is not session:
             return
@@ -113,7 +113,7 @@ class Exchanges:
         return [m for m in users if bench.jobs.moving(m.drive.id) is not None]
 
     def require_idle_but(self, connected: ConnectedDrive) -> None:
-        """The exchange of this axis' buses moves no other axis: it may be ended.
+        """Check that no other axis is moved through the exchange of this axis, so it may be ended.
 
         Raises:
             Busy: another axis is moved through it.
@@ -128,7 +128,7 @@ class Exchanges:
                 )
 
     async def close(self) -> None:
-        """End all of them."""
+        """End all exchanges."""
         for task in list(self._later):
             task.cancel()
         for url in list(self.running):
@@ -139,7 +139,7 @@ class Exchanges:
 
     @contextlib.contextmanager
     def _changing_of(self, url: str) -> Iterator[None]:
-        """No motion begins on this bus meanwhile: its drives would be removed meanwhile."""
+        """Context in which no motion begins on this bus, as its exchange is changed."""
         self._changing.add(url)
         try:
             yield
@@ -148,7 +148,7 @@ class Exchanges:
 
     @contextlib.contextmanager
     def searching(self, url: str) -> Iterator[None]:
-        """No motion begins on this bus while it is searched."""
+        """Context of a scan, in which no motion begins on this bus."""
         self._searched[url] += 1
         try:
             yield
@@ -157,10 +157,10 @@ class Exchanges:
 
     @contextlib.contextmanager
     def reserved(self, url: str) -> Iterator[None]:
-        """Nothing else starts an exchange of this bus meanwhile, and no motion begins on it.
+        """Context in which nothing else starts an exchange or a motion on this bus.
 
         Raises:
-            Busy: its exchange runs or is being changed, it is searched, or a drive of it moves.
+            Busy: its exchange runs or is being changed, it is scanned, or a drive on it moves.
         """
         bench = self._bench
         self._require_settled(url)
@@ -174,10 +174,10 @@ class Exchanges:
             yield
 
     def require_calm(self, name: str, urls: Collection[str]) -> None:
-        """A motion of the axis of this ``name`` may begin.
+        """Check that a motion of the axis of this ``name`` may begin.
 
         Raises:
-            Busy: one of its buses is being changed or searched.
+            Busy: the exchange of one of its buses is being changed, or the bus is scanned.
         """
         for url in urls:
             if url in self._changing:

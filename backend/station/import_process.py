@@ -1,6 +1,7 @@
-"""The process of an import: ``python -m backend.station.import_process MIB`` of memory at most.
+"""Process of an import: ``python -m backend.station.import_process MIB``, its memory limit [MiB].
 
-What a file takes to be read is not known before: its elements may take forty times their bytes.
+The memory needed for a file is not known beforehand: its elements may take forty times their size
+in the file.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from drivers.computer.processes import limit_memory, yield_processor
 from profiles.importer.process import main
 
 if __name__ == "__main__":
-    # STOP and the buses go first, however many files are read.
+    # STOP and the buses have priority, however many files are read.
     yield_processor()
     most_mib = int(sys.argv[1])
     limit_memory(most_mib << 20)

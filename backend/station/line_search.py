@@ -1,4 +1,4 @@
-"""Look for the baud rate and parity of a serial bus, unless the bus is in use."""
+"""Search for the baud rate and parity of a serial bus that is not in use."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ from drivers.urls import bus_kind, parse_url
 async def search_line(
     bench: Bench, url: str, stations: Sequence[int], progress: Callable[[float, Text], None]
 ) -> LineFound | None:
-    """See `drivers.modbus.search.search_line_settings`; the bus is closed first.
+    """Search for the line settings of a serial bus; the bus is closed first.
+
+    See `drivers.modbus.search.search_line_settings`.
 
     Raises:
-        OutOfRange: no bus URL. NotAllowed: not a serial line.
-        Busy: drives of the bench use this adapter. LinkLost: the adapter is missing.
+        OutOfRange: not a bus URL.
+        NotAllowed: not a serial line.
+        Busy: connected drives use this adapter.
+        LinkLost: the adapter is missing.
     """
     wanted = parse_url(url)
     kind = bus_kind(wanted.scheme)

@@ -1,4 +1,4 @@
-"""Which profile fits what a scan found."""
+"""Profiles that match a drive found by a scan."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from profiles.schema import LinkSpec, Profile
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A profile that fits a found drive. Confidence: certain, likely or possible."""
+    """A profile that matches a found drive, with confidence and reason."""
 
     profile: Profile
     confidence: Literal["certain", "likely", "possible"]
@@ -25,7 +25,7 @@ class Match:
 
 
 def match_profiles(kind: str, found: Found) -> list[Match]:
-    """Profiles that fit what a scan saw, best first."""
+    """Profiles that match a drive found by a scan, best first."""
     matches: list[Match] = []
     for profile in load_all().values():
         if profile.link(kind) is None:
@@ -46,7 +46,7 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
             why = text("station.match-name", name=found.name)
             matches.append(Match(profile, "likely", why))
         else:
-            # Silent is the drive, or already its manual.
+            # The vendor ID is unknown: the manual states none, or the drive does not report it.
             silent = "manual" if identity.vendor_id is None else "drive"
             matches.append(
                 Match(profile, "possible", text("station.match-bus", bus=kind, silent=silent))
@@ -56,11 +56,11 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
 
 
 def profile_for(kind: str, name: str) -> tuple[Profile, LinkSpec]:
-    """The profile ``name`` for a drive on a bus of this kind, and how it is reached there.
+    """The profile ``name`` and its link on a bus of this kind.
 
     Raises:
-        NotAllowed: no such profile, or one whose drives have no such port: its numbers would be
-            written into a drive of another family.
+        NotAllowed: no such profile, or one whose drives have no such port: its values would be
+            written to a drive of another family.
     """
     try:
         profile = load_profile(name)

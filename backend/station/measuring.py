@@ -1,4 +1,4 @@
-"""The exchange of process data that a measurement needs: the one that runs, or one of its own."""
+"""Cyclic exchange for a measurement: the running one, or one that is started for it."""
 
 from __future__ import annotations
 
@@ -15,31 +15,35 @@ from backend.work.jobs import Job
 from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import text
 
-#: Ending an exchange, and starting the one that had to be stopped.
+#: Time limit for ending an exchange and starting again the one that had to be stopped [s].
 EXCHANGE_ENDS_S = 60.0
-#: Setting one up for a measurement; its request is answered then, within the 30 s that pages and
-#: programs wait, also where a segment falls silent in the middle and ending it takes 15 s more.
+#: Time limit for starting an exchange for a measurement [s]. Its request is then answered within
+#: the 30 s that pages and programs wait, even where a segment stops answering meanwhile and ending
+#: the exchange takes 15 s more.
 SET_UP_S = 14.0
 
 
 @dataclass
 class Exchange:
-    """A running exchange, and what to do with it afterwards."""
+    """A running exchange of a measurement, and how it is ended afterwards."""
 
     session: CyclicSession
     bench: Bench
     drive: str
     url: str
     own: bool
-    """It was started for this measurement."""
+    """Whether it was started for this measurement."""
     before_s: float | None = None
-    """Cycle of the exchange that had to be stopped to it."""
+    """Cycle time of the exchange that had to be stopped for it [s]; None where none ran."""
     taken: bool = False
-    """The measurement has begun, and ends it."""
+    """Whether the measurement has begun, which then ends the exchange itself."""
     late: asyncio.Task[None] | None = None
 
     def ends_with(self, job: Job) -> None:
-        """End it also where STOP cancels the job before its first step: no cleanup runs then."""
+        """End the exchange also where STOP cancels the job before its first step.
+
+        No cleanup of the job runs in that case.
+        """
 
         def ended(_task: object) -> None:
             if not self.taken:
@@ -49,9 +53,9 @@ class Exchange:
             job.task.add_done_callback(ended)
 
     async def end(self) -> None:
-        """Leave the bus as it was, as soon as no other axis moves through the exchange.
+        """Return the bus to its earlier state, once no other axis moves through the exchange.
 
-        A drive that does not let itself be set up again is informed of.
+        A failure to start the earlier exchange again is logged.
         """
         if not self.own:
             return
@@ -70,21 +74,21 @@ class Exchange:
 
 
 def port_of(connected: ConnectedDrive) -> Port:
-    """The port with process data, else the first."""
+    """The port with process data; otherwise the first port."""
     ports = connected.drive.ports
     return next((port for port in ports if port.link.cyclic is not None), ports[0])
 
 
 async def exchange_for(bench: Bench, connected: ConnectedDrive, cycle_s: float) -> Exchange:
-    """The running exchange if it suits, else one that is started for the measurement.
+    """The running exchange where it suits; otherwise one that is started for the measurement.
 
-    A drive without cyclic modes is commanded by its profile velocity during the measurement only,
-    so an exchange that runs is stopped meanwhile.
+    A drive without cyclic modes is commanded in Profile velocity mode during a measurement only, so
+    a running exchange without this is stopped meanwhile.
 
     Raises:
-        Busy: a drive of the bus is moved.
+        Busy: a drive on the bus is moved.
         NotAllowed: no cyclic data on this bus, or a drive refuses.
-        LinkTimeout: it is not set up within `SET_UP_S`, and is not going to be.
+        LinkTimeout: not started within `SET_UP_S`; the attempt is cancelled.
     """
     try:
         async with asyncio.timeout(SET_UP_S):

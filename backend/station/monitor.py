@@ -1,4 +1,4 @@
-"""Watches one axis: polls its state, notices loss, return and restart, and records faults."""
+"""Monitor of one axis: polls its state, detects loss, return and restart, and logs faults."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ from profiles.schema import Fault
 
 log = logging.getLogger(__name__)
 
-#: Polling period while somebody watches, and while nobody does.
+#: Polling period while a page shows the axis, and while none does [s].
 WATCHED_S = 0.1
 IDLE_S = 1.0
-#: During an exchange that brings state and values, everything else is asked for so often.
+#: Period of full polls during an exchange that delivers state and values [s].
 ASKED_S = 1.0
-#: Option codes and ramps of STOP, and scales, are asked for so often, while the axis is enabled.
+#: Period for reading option codes and ramps of STOP, and scales, while the axis is enabled [s].
 STOP_ASKED_S = 0.9
-#: Process data older than this say nothing of the present.
+#: Greatest age of process data that count as the present state [s].
 NEWEST_S = 0.05
-#: What changes slowly enough to be asked for with everything else only.
+#: Values that change so slowly that only full polls read them.
 _SLOW_ROLES = ("dc_voltage", "temperature")
 
 _VALUE_ROLES = {
@@ -48,14 +48,15 @@ _VALUE_ROLES = {
 }
 
 _SHOWN_ROLES = (*_VALUE_ROLES.values(), "mode_display")
-#: A change of these has everything asked for.
+#: Signals whose change causes a full poll.
 _STATE_ROLES = ("status_word", "error_code")
-#: Target reached, internal limit and the bits of the mode come and go with every motion.
+#: Status bits that change with every motion: target reached, internal limit, mode-specific bits.
 _MODE_SPECIFIC = 0x3C00
-#: Monitors that run, counted: times the golden ratio they are spread evenly, however many.
+#: Running number of monitors. Multiplied by the golden ratio it gives evenly spread phases for any
+#: number of monitors.
 _COUNT = itertools.count()
 _GOLDEN = 0.6180339887498949
-#: A place nearer than this part of the period is left for the next one: the bus has a rest.
+#: A due time nearer than this share of the period is skipped, to leave the bus free for others.
 _SOON = 0.5
 _FAULTY = (State.FAULT, State.FAULT_REACTION, State.UNKNOWN)
 
@@ -72,7 +73,7 @@ _MODE_BITS: dict[int, tuple[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """State of an axis at one time (epoch seconds); values in the axis' units."""
+    """State of an axis at one time [s since 1970]; values in the axis' units."""
 
     time: float
     fresh: bool
@@ -88,11 +89,11 @@ class Snapshot:
     faults: tuple[Fault, ...] = ()
     blocked_by: tuple[Text, ...] = ()
     turning: Turning | None = None
-    """It turns although nobody may move it."""
+    """Set where the axis turns although nothing is permitted to move it."""
 
 
 class Monitor:
-    """Polls one axis for as long as it is part of the bench."""
+    """Polls one axis as long as it is connected."""
 
     def __init__(
         self,
@@ -104,7 +105,7 @@ class Monitor:
     ) -> None:
         self.axis = axis
         self.snapshot = Snapshot(time.time(), fresh=False, problem=text("station.not-read-yet"))
-        #: The live connections that look at it.
+        #: Live connections that show this axis.
         self.watchers: set[str] = set()
         self._journal = journal
         self._changed = changed
@@ -117,13 +118,13 @@ class Monitor:
         self._last_causes: list[Text] = []
         self._waiting: list[str] = []
         self._asked_s = -math.inf
-        #: How often it was asked, and which of these the snapshot is of.
+        #: Number of the last poll, and of the poll that the snapshot comes from.
         self._polls = self._shown = 0
-        # All axes at the same instant would keep everybody else waiting for their sum.
+        # If all axes polled at the same instant, other requests would wait for all of them.
         self._phase = next(_COUNT) * _GOLDEN % 1
 
     def start(self) -> None:
-        """Begin to poll."""
+        """Begin polling."""
         name = f"monitor-{self.axis.drive.id}"
         self._task = asyncio.create_task(self._run(), name=name, context=by_itself())
 
@@ -134,7 +135,7 @@ class Monitor:
             await asyncio.wait([self._task])
 
     def hurry(self) -> None:
-        """Poll at once; somebody began to watch or changed something."""
+        """Poll at once, as a page opened the axis or something changed."""
         self._wake.set()
 
     async def _run(self) -> None:
@@ -142,7 +143,7 @@ class Monitor:
             try:
                 await self._poll(self._read_what_changes)
             except Exception as error:
-                # A watch that ended unseen would show the last state as the present one for ever.
+                # A monitor that ended unnoticed would show its last state as the present one.
                 log.exception("the state of %s cannot be shown", self.axis.drive.name)
                 problem = internal_error(error)
                 self.snapshot = replace(self.snapshot, fresh=False, problem=problem)
@@ -153,14 +154,14 @@ class Monitor:
                     await self._wake.wait()
 
     def _until_due(self, period_s: float) -> float:
-        """Seconds to this monitor's own place in the period."""
+        """Time to this monitor's own phase of the period [s]."""
         left = (self._phase - time.monotonic() / period_s) % 1
         return (left if left > _SOON else left + 1) * period_s
 
     async def refresh(self) -> Snapshot:
-        """Read the state now. A failure becomes a snapshot that says so, with the old values.
+        """Read the state now. On failure the snapshot has the problem and the earlier values.
 
-        A drive that a procedure leaves alone is not asked; the last snapshot stands.
+        While a procedure has exclusive access to the drive, the last snapshot is returned.
         """
         return await self._poll(self._read)
 
@@ -180,8 +181,8 @@ class Monitor:
             snapshot = replace(
                 self.snapshot, time=time.time(), fresh=False, problem=error.text, turning=None
             )
-        # A request may ask while the watch does: each change is news once, and what was asked
-        # earlier is no news.
+        # A request may poll at the same time as the monitor: each change is reported once, and
+        # the result of an earlier poll is discarded.
         if number < self._shown:
             return self.snapshot
         before, self.snapshot, self._shown = self.snapshot, snapshot, number
@@ -190,7 +191,7 @@ class Monitor:
         return snapshot
 
     async def _read(self) -> Snapshot:
-        """Everything, from the drive itself."""
+        """Full poll: read all shown values from the drive."""
         drive = self.axis.drive
         began_s = time.monotonic()
         wanted = [drive.require("status_word")]
@@ -208,10 +209,11 @@ class Monitor:
         return await self._snapshot()
 
     async def _read_what_changes(self) -> Snapshot:
-        """The newest process data instead of questions, as long as they show nothing new.
+        """Snapshot from the newest process data, as long as state and faults are unchanged.
 
-        The drive itself is still asked every `ASKED_S`: process data may go on where its mailbox,
-        and with it the firmware, is dead. Any change of state or fault has everything asked for.
+        A full poll is still made every `ASKED_S`, as process data may continue although the
+        mailbox, and with it the firmware, has failed. Any change of state or fault causes a full
+        poll.
         """
         axis, drive = self.axis, self.axis.drive
         session = axis.session
@@ -229,10 +231,10 @@ class Monitor:
         return await self._snapshot()
 
     async def _read_settings(self, now_s: float) -> None:
-        """Read what other programs may change while the axis has power.
+        """Read settings that other programs may change while the axis has power.
 
-        How the drive brakes, as STOP has no time to read it; and the scales, which the axis
-        compares.
+        These are the stop settings, as STOP has no time to read them, and the scales, which the
+        axis compares.
         """
         if now_s - self._stop_asked_s >= STOP_ASKED_S:
             self._stop_asked_s = now_s
@@ -240,7 +242,7 @@ class Monitor:
             await self.axis.look_at_scales()
 
     def _state_differs(self, newest: Mapping[str, Reading], telling: Sequence[str]) -> bool:
-        """Whether state, warning or error code are not what they were, or are not known."""
+        """Whether state, warning or error code have changed or are not known."""
         drive = self.axis.drive
         reported, known = (
             [integer(readings.get(key)) for key in telling] for readings in (newest, self._last)

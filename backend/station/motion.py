@@ -1,4 +1,4 @@
-"""Which axes of a bench may begin to move, and how they are stopped."""
+"""Permission for axes of a bench to begin a motion, and STOP."""
 
 from __future__ import annotations
 
@@ -27,25 +27,27 @@ _STOP_PRESSED = text("motion.stop-was-pressed")
 
 
 class Motion:
-    """For one bench: what holds an axis still, STOP for all, and switching the power off."""
+    """Motion of one bench: interlocks, STOP of all axes, and switching the power off."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._stops: set[asyncio.Task[dict[str, Text | None]]] = set()
         self._later: set[asyncio.Task[None]] = set()
-        #: What watches each stopped axis, by drive: it goes on when nobody waits for it.
+        #: Supervision of each stopped axis, by drive; it continues when nobody waits for it.
         self._watches: dict[str, asyncio.Task[AxisStop]] = {}
-        #: Drives of which something is changed that no motion may begin with.
+        #: Drives with a change in progress during which no motion may begin.
         self._still: Counter[str] = Counter()
         #: Drives that are being removed.
         self._parting: set[str] = set()
 
     @contextlib.contextmanager
     def keeping_still(self, connected: ConnectedDrive) -> Iterator[None]:
-        """Nothing begins to move this axis meanwhile, as what it relies on is changed. STOP works.
+        """Context in which no motion of this axis begins, as settings it relies on are changed.
+
+        STOP works meanwhile.
 
         Raises:
-            Busy: something moves it already.
+            Busy: a job moves the axis already.
         """
         self.require_idle(connected)
         self._still[connected.drive.id] += 1
@@ -55,7 +57,7 @@ class Motion:
             self._still[connected.drive.id] -= 1
 
     def require_idle(self, connected: ConnectedDrive) -> None:
-        """Nothing moves this axis.
+        """Check that no job moves this axis.
 
         Raises:
             Busy: a job does.
@@ -65,7 +67,7 @@ class Motion:
 
     @contextlib.contextmanager
     def parting(self, connected: ConnectedDrive) -> Iterator[None]:
-        """STOP reaches what is on the bench: nothing may begin to move on its way off it."""
+        """Context of removing a drive: no motion may begin, as STOP reaches listed axes only."""
         self._parting.add(connected.drive.id)
         try:
             yield
@@ -73,19 +75,20 @@ class Motion:
             self._parting.discard(connected.drive.id)
 
     def require_stays(self, connected: ConnectedDrive) -> None:
-        """Nobody is taking this drive off the bench.
+        """Check that this drive is not being removed.
 
         Raises:
-            Busy: somebody is.
+            Busy: it is.
         """
         if connected.drive.id in self._parting:
             raise Busy("station.being-taken-off-bench", drive=connected.drive.name)
 
     def permit(self, drive_id: str) -> None:
-        """A new motion begins by a person's command; it takes back an earlier STOP.
+        """Permit a new motion by a person's command; it cancels an earlier STOP.
 
         Raises:
-            Busy: the exchange of its bus is being started or ended, or it leaves the bench.
+            Busy: the exchange of its bus is being started or ended, its settings are being changed,
+                or the drive is being removed.
             NotAllowed: STOP was pressed after the command had been given.
         """
         connected = self._bench.connected(drive_id)
@@ -96,14 +99,15 @@ class Motion:
             connected.drive.name, self._bench.buses.urls_of(connected.drive)
         )
         connected.axis.permit()
-        # It sees that and ends; a STOP of the new motion gets a watch of its own.
+        # The earlier supervision notices the permit and ends; a STOP of the new motion gets its
+        # own.
         self._watches.pop(drive_id, None)
 
     def granted(self, job: Job) -> contextlib.AbstractContextManager[object]:
-        """What a job holds for its length: a grant where it moves its axis.
+        """Grants that a job holds for its duration, one for each axis that it moves.
 
-        Work that keeps its axis still (`Job.stoppable`) has none. When the grant ends before the
-        job does, the job is cancelled and brings its axis to rest.
+        Work that STOP does not cancel (`Job.stoppable` is False) has none, as it keeps its axis at
+        standstill. When the grant ends before the job, the job is cancelled and stops its axis.
         """
         found = [self._bench.connected_drives.get(each) for each in job.moved]
         drives = [connected.drive for connected in found if connected is not None]
@@ -124,7 +128,7 @@ class Motion:
         return grants()
 
     def scales_changed(self, drive_id: str, keys: Sequence[str]) -> None:
-        """End a motion that was planned with other scales than the axis has now."""
+        """End a motion that was planned with scales other than the present ones."""
         connected = self._bench.connected_drives.get(drive_id)
         authority = self._bench.authority
         if connected is None or authority.mover_of(drive_id) is None:
@@ -139,10 +143,10 @@ class Motion:
         authority.end_motion(drive_id, line)
 
     def unattended(self, drive_id: str, why: Text) -> None:
-        """Nobody may leave this axis enabled any longer: it loses its power."""
+        """Switch off the power of an axis that nobody may leave enabled any longer."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is None or connected.axis.stopped:
-            return  # STOP takes the power off, and says what became of the axis
+            return  # STOP switches the power off and reports the result
         line = text("station.loses-power-unattended", drive=connected.drive.name, why=why)
         self._bench.journal.add(line, level="warning", drive=drive_id)
         task = asyncio.create_task(self.let_go(drive_id), name=f"unattended-{drive_id}")
@@ -154,10 +158,10 @@ class Motion:
     ) -> dict[str, Text | None]:
         """Quick stop of these drives, all at once; motion jobs are cancelled because of ``why``.
 
-        The write does not wait for any job's cleanup, and goes out even when whoever asked for
-        it is gone by then. Returns drive id to problem, None where the drive took the stop.
-        Whether the axis is at standstill is watched from then on, and shows `standstill`. The
-        other axis of a job that moves two on one machine is stopped as well.
+        The write does not wait for any job's cleanup, and is sent even when the caller has been
+        cancelled. Returns the problem by drive id, None where the stop was delivered. From then on
+        the axis is supervised until standstill; `standstill` returns the result. The other axis of
+        a job that moves two axes on one machine is stopped as well.
         """
         moved = [job.moved for each in drive_ids if (job := self._bench.jobs.moving(each))]
         drive_ids = list(dict.fromkeys([*drive_ids, *(each for two in moved for each in two)]))
@@ -168,7 +172,7 @@ class Motion:
             self._bench.authority.revoke(connected.drive.id, why)
             job = self._bench.jobs.moving(connected.drive.id)
             if job is not None and job.stoppable:
-                # Cancelled before the write, so that it sends nothing after it but its cleanup.
+                # Cancelled before the write, so that after it only the job's cleanup is sent.
                 job.cancel(why)
         task = asyncio.create_task(self._stop(connected_drives), name="stop")
         self._stops.add(task)
@@ -191,7 +195,10 @@ class Motion:
         return {m.drive.id: problem for m, problem in zip(connected_drives, problems, strict=True)}
 
     def _begin_watch(self, connected: ConnectedDrive, problem: Text | None) -> None:
-        """One watch of an axis at a time: STOP pressed again has sent its word again."""
+        """Begin the supervision of a stopped axis, unless an earlier one still runs.
+
+        Only one runs per axis: a second STOP has sent its control word again anyway.
+        """
         drive_id = connected.drive.id
         if self.stopping(drive_id):
             return
@@ -207,7 +214,7 @@ class Motion:
             try:
                 found = await StopWatch(connected.axis, end_process_data).run(problem)
             except Exception as error:
-                # A watch that ended without a verdict must not pass for an axis that stands.
+                # A supervision that failed must not be taken for an axis at standstill.
                 log.exception("the stop of %s cannot be watched", connected.drive.name)
                 why = internal_error(error)
                 found = AxisStop(drive_id, Verdict.STILL_MOVING, 0.0, problem=why)
@@ -223,14 +230,16 @@ class Motion:
             self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
     async def standstill(self, drive_ids: Sequence[str]) -> list[AxisStop]:
-        """What the last STOP of these drives has reached; waits for verdicts that are due.
+        """Results of the last STOP of these drives; waits for outstanding verdicts.
 
-        Drives that were never stopped are left out. One that is removed from the axis list
-        meanwhile was not seen to stand, and is reported so. May take some seconds.
+        Drives that were never stopped are left out. A drive that is removed from the axis list
+        meanwhile is reported as unreachable, as its standstill was not observed. May take some
+        seconds.
         """
         watches = {each: self._watches[each] for each in drive_ids if each in self._watches}
         if watches:
-            # Not gathered: a watch that is ended with its drive must not end the others' answer.
+            # Not gathered: a cancelled supervision must not raise here and hide the others'
+            # results.
             await asyncio.wait(watches.values())
         return [
             _unseen(drive_id) if watch.cancelled() else watch.result()
@@ -238,12 +247,12 @@ class Motion:
         ]
 
     def stopping(self, drive_id: str) -> bool:
-        """Whether a STOP of this axis is being watched."""
+        """Whether a STOP of this axis is still being supervised."""
         watch = self._watches.get(drive_id)
         return watch is not None and not watch.done()
 
     async def end_watches(self, drive_id: str | None = None) -> None:
-        """The drive leaves the bench, or the bench is closed."""
+        """End the supervision of one drive that is removed, or of all where the bench is closed."""
         ids = list(self._watches) if drive_id is None else [drive_id]
         watches = [found for each in ids if (found := self._watches.pop(each, None)) is not None]
         for watch in watches:
@@ -251,22 +260,22 @@ class Motion:
         await asyncio.gather(*watches, return_exceptions=True)
 
     async def let_go(self, drive_id: str) -> None:
-        """Take the power off an axis that was enabled here and left so; never raises."""
+        """Switch off the power of an axis that was left enabled; raises no DriveError."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is not None:
             job = self._bench.jobs.moving(drive_id)
             if job is not None:
-                # Of the page that is gone, and being ended: the axis is stopped first.
+                # The job of a closed page is being ended; it stops the axis first.
                 await job.wait()
             await self.let_go_of(connected)
             connected.monitor.hurry()
 
     async def let_go_of(self, connected: ConnectedDrive) -> None:
-        """Take the power off an axis now; where that fails, its stop is pending; never raises."""
+        """Switch off the power of an axis now; on failure its stop is pending; no DriveError."""
         try:
             await connected.axis.let_go()
         except DriveError as error:
-            # Commanded to stop as soon as it answers, here or after it was added again.
+            # The stop is sent as soon as the drive answers, also after it was added again.
             connected.axis.stop_pending = True
             line = text(
                 "station.may-still-be-enabled", drive=connected.drive.name, cause=error.text
@@ -274,13 +283,13 @@ class Motion:
             self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
     async def let_go_of_all(self) -> None:
-        """Take the power off every axis of the bench, all at once; never raises."""
+        """Switch off the power of every axis of the bench at once; raises no DriveError."""
         await asyncio.gather(
             *(self.let_go_of(connected) for connected in self._bench.connected_drives.values())
         )
 
 
 def _unseen(drive_id: str) -> AxisStop:
-    """Of an axis whose watch was ended before it had a verdict."""
+    """Result for an axis whose supervision was ended before it had a verdict."""
     why = text("stopping.ended-unwatched")
     return AxisStop(drive_id, Verdict.UNREACHABLE, 0.0, problem=why)

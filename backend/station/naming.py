@@ -1,4 +1,4 @@
-"""What a drive is called when nobody says, and the id that the interface knows it by."""
+"""Default names of drives, and their ids in the API."""
 
 from __future__ import annotations
 
@@ -7,22 +7,19 @@ from collections.abc import Collection, Mapping
 
 
 class PlaceNames:
-    """Names that belong to places: a bench of virtual drives knows what hangs where.
-
-    ``names`` are by bus URL and station.
-    """
+    """Default names by bus URL and station, as a bench of virtual drives states them."""
 
     def __init__(self, names: Mapping[tuple[str, int], str]) -> None:
         self._names = dict(names)
 
     def unused(self, url: str, station: int, taken: Collection[str]) -> str:
-        """The name of this place; empty where it has none, or a drive is called so already."""
+        """The name for this station; empty where it has none or the name is in use."""
         name = self._names.get((url, station), "")
         return "" if name in taken else name
 
 
 def new_id(name: str, taken: Collection[str]) -> str:
-    """``name`` as small letters, digits and hyphens, with a number where that is taken."""
+    """``name`` as lower-case letters, digits and hyphens, with a number where that is in use."""
     stem = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "drive"
     number, drive_id = 2, stem
     while drive_id in taken:

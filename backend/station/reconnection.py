@@ -1,4 +1,4 @@
-"""What is done when a drive answers again: nothing that was known of it is trusted."""
+"""Actions when a drive answers again: everything is read again, as it may have restarted."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ _STANDS_S, _STANDS_RPM = 0.5, 5.0
 
 
 class Reconnection:
-    """For the drives of one bench."""
+    """Reconnection of the drives of one bench."""
 
     def __init__(self, bench: Bench, lists: RestoreStore) -> None:
         self._bench = bench
         self._lists = lists
-        #: Drives with pending restores whose axis did not stand free when they answered.
+        #: Drives with pending restores whose axis was enabled, moving or in a job at their return.
         self._awaited: set[str] = set()
 
     def begin(self, axis: Axis) -> None:
-        """Recall what an earlier server or command left in a drive; keep its list from now on.
+        """Load the restore list that an earlier server or command left, and keep it from now on.
 
-        An axis that was moved by a process which was killed a moment ago is stopped: what a drive
-        carries out by itself (a homing that looks for a switch) goes on without anybody.
+        An axis that was moved by a process killed a moment ago is stopped: a motion that the drive
+        carries out by itself, such as homing, continues without the process.
         """
         drive, journal = axis.drive, self._bench.journal
         known = self._lists.list_of(identity_of(drive), drive.id)
@@ -58,7 +58,7 @@ class Reconnection:
             line = text("journal.restore-list-not-kept", cause=error.text)
             journal.add(line, level="warning", drive=drive.id)
 
-        # A stop that did not reach the drive stays pending for the next server, too.
+        # A stop that did not reach the drive stays pending for the next server as well.
         keep_list(
             drive,
             known,
@@ -66,11 +66,11 @@ class Reconnection:
             failed=failed,
         )
         if drive.found is None and pending.serial is not None:
-            # What is pending is of that one: another that answers here is noticed.
+            # The pending restores belong to this serial number: another drive is detected by it.
             drive.found = Found(drive.ports[0].station, serial=pending.serial)
 
     def returned(self, drive_id: str) -> None:
-        """It may have restarted: everything is read again, and pending values are restored."""
+        """Read everything again and restore pending values, as the drive may have restarted."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is None:
             return
@@ -90,7 +90,7 @@ class Reconnection:
         )
 
     async def _is_the_same(self, connected: ConnectedDrive) -> bool:
-        """Notice another drive at this place before anything is written to it."""
+        """Whether the connected drive answers; detects another drive before anything is written."""
         drive = connected.drive
         if _serial(drive) is None:
             return True
@@ -102,7 +102,7 @@ class Reconnection:
         return True
 
     async def _settled(self, connected: ConnectedDrive) -> None:
-        """Put back by itself, unless something else has the axis; then when it stands free."""
+        """Restore pending values now, or later where the axis is enabled, moving or in a job."""
         drive_id = connected.drive.id
         if self._bench.jobs.moving(drive_id) is not None:
             self._awaited.add(drive_id)
@@ -114,15 +114,15 @@ class Reconnection:
         try:
             job = self.start(connected, asked=False)
         except Busy:
-            # The drive fell silent and answered once more while it was looked at.
+            # The drive was lost and returned once more during these checks.
             self._awaited.add(drive_id)
             return
         await job.wait()
 
     def seen(self, connected: ConnectedDrive, snapshot: Snapshot) -> None:
-        """An axis that was enabled when its drive answered stands now: restore what is pending.
+        """Restore pending values once an axis that could not be restored at once is free.
 
-        Once; what cannot be restored then stays on offer.
+        Tried once; values that cannot be restored then remain offered to the user.
         """
         drive = connected.drive
         if drive.id not in self._awaited or not snapshot.fresh:
@@ -135,10 +135,12 @@ class Reconnection:
             self.start(connected, asked=False)
 
     def start(self, connected: ConnectedDrive, *, asked: bool) -> Job:
-        """Restore what is pending, as a job that holds the axis where it is.
+        """Restore pending values, as a job during which the axis cannot be moved.
+
+        ``asked``: a person requested it.
 
         Raises:
-            Busy: something moves the axis.
+            Busy: another job moves the axis.
         """
         bench, drive = self._bench, connected.drive
 

@@ -1,4 +1,4 @@
-"""What a station keeps: the database with library and audit, and the folders next to it."""
+"""Stored data of a station: the database with library and audit, and the folders next to it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from backend.work.journal import Journal
 from drivers.errors import Busy, with_remedy
 from drivers.texts.message import Text, text
 
-#: How long a start waits for a database on a server.
+#: Time for which the start waits for a database on a server [s].
 REMOTE_S = 1.0
 
 
 class Records:
-    """Database, audit and library of one station. Making it touches nothing.
+    """Database, audit and library of one station. The constructor opens and writes nothing.
 
     ``database`` and ``blobs`` are URLs (see docs/library.md); None means the state folder.
     """
@@ -47,17 +47,17 @@ class Records:
         self._taking_up: asyncio.Task[None] | None = None
 
     def claim(self) -> None:
-        """Be the only one who uses the state folder, which is made where it is not there. Blocks.
+        """Lock the state folder for this process, creating it where it is missing. Blocks.
 
-        What an older servodeck kept is migrated.
+        Data of an older servodeck are migrated.
 
         Raises:
-            Busy: another servodeck uses it.
-            StateRefused: a newer servodeck has written it; nothing was changed.
+            Busy: another servodeck uses the folder.
+            StateRefused: a newer servodeck has written the folder; nothing was changed.
         """
         state_version.check(self.store.folder)
         with contextlib.suppress(OSError):
-            # One that cannot be made or written has nothing that two could disturb.
+            # A folder that cannot be created or written needs no lock against a second process.
             self.store.folder.mkdir(parents=True, exist_ok=True)
         if not self._lock.take():
             raise Busy(
@@ -75,12 +75,14 @@ class Records:
             raise
 
     def release(self) -> None:
-        """Let another have the folder; does nothing where it is not claimed."""
+        """Release the lock of the folder; does nothing where it is not held."""
         self._lock.give()
 
     async def open(self) -> None:
-        """Open the database and take up what was left over. A station without it still works:
-        drives are moved and stopped, and what needs the database says what is wrong with it.
+        """Open the database and process data left over from earlier.
+
+        A station without a database still works: drives are moved and stopped, and functions that
+        need the database report its error.
         """
         self._loop = asyncio.get_running_loop()
         if not self._lock.take():
@@ -90,7 +92,7 @@ class Records:
             )
         self.audit.start()
         self._taking_up = asyncio.create_task(self._take_up(), name="records")
-        # A database far away that does not answer keeps no drive waiting.
+        # A remote database that does not answer must not delay the drives.
         done, _ = await asyncio.wait(
             {self._taking_up}, timeout=None if self.store.sqlite_file else REMOTE_S
         )
@@ -108,7 +110,7 @@ class Records:
             self._journal.add(with_remedy(error), level="error")
 
     async def close(self) -> None:
-        """Write down what is left."""
+        """Write pending audit records, close the database and release the folder."""
         self._loop = None
         if self._taking_up is not None:
             await asyncio.wait({self._taking_up})
@@ -117,7 +119,7 @@ class Records:
         self._lock.give()
 
     def _audit_changed(self, problem: Text | None) -> None:
-        """Called on the audit's thread."""
+        """Log a change of the audit's state; called on the audit's thread."""
         loop = self._loop
         if loop is not None and not loop.is_closed():
             line = (

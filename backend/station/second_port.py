@@ -1,4 +1,4 @@
-"""A drive's further ports: what only they reach, and whether the same drive is behind them."""
+"""Further ports of a drive: parameters only they carry, and the check that it is the same drive."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.errors import LinkTimeout, NotAllowed
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind
 
-#: Settings that are compared before a second port is trusted.
+#: Number of settings that are compared before a second port is accepted.
 _COMPARED = 24
 
 
@@ -20,8 +20,8 @@ _COMPARED = 24
 class MissingPort:
     """A port that the family has and that is not connected.
 
-    ``parameters`` is how many of them no connected port reaches and this one would; ``groups``
-    names where they are, the fullest first.
+    ``parameters``: number of parameters that only this port would carry; ``groups``: their groups,
+    largest first.
     """
 
     kind: LinkKind
@@ -31,7 +31,7 @@ class MissingPort:
 
 
 def missing_ports(drive: Drive) -> list[MissingPort]:
-    """Ports over which a drive is not reached yet."""
+    """Ports of the drive's family that are not connected."""
     connected = {port.link.kind for port in drive.ports}
     found = []
     for spec in drive.profile.links:
@@ -50,14 +50,14 @@ def missing_ports(drive: Drive) -> list[MissingPort]:
 
 
 async def require_same_drive(drive: Drive, other: Port) -> None:
-    """Settings read over the new port are those that the connected ports hold.
+    """Check that settings read over the new port equal those of the connected ports.
 
-    Serial buses show no identity, and a swapped cable must not write another motor's data. Two
+    Serial buses report no identity, and a swapped cable must not cause writes to another drive. Two
     drives with equal settings cannot be distinguished this way.
 
     Raises:
-        LinkTimeout: nothing answers there.
-        NotAllowed: values differ; the message shows the first of them.
+        LinkTimeout: no drive answers at the new port.
+        NotAllowed: values differ; the message contains the first of them.
     """
     shared = [
         p

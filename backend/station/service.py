@@ -47,7 +47,9 @@ WantedBy=multi-user.target
 
 
 def systemd_unit() -> str:
-    """The text of ``servodeck.service``: exactly the capabilities that `permissions.check` asks
-    for are granted, and no other can be had (systemd.exec(5)).
+    """The text of ``servodeck.service``.
+
+    It grants exactly the capabilities that `permissions.check` requires, and limits the process to
+    these (systemd.exec(5)).
     """
     return _UNIT.format(capabilities=" ".join((*NEEDED, *USEFUL)))

@@ -1,1 +1,1 @@
-"""The quick stop of one axis: its settings, how it is raised, what brakes where it would coast."""
+"""The quick stop of one axis: settings, deceleration, and braking where it would coast."""

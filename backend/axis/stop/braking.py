@@ -1,7 +1,7 @@
 """STOP of a drive whose quick stop would not brake.
 
-Either it takes the power off (605Ah = 0), or the family takes only the torque back in its torque
-modes (M6-L 000:3019): another mode brakes then.
+Either it switches the power off (605Ah = 0), or the family only ramps down the torque in its torque
+modes (M6-L 000:3019), so that another mode must brake.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from drivers.texts.message import Text, text
 if TYPE_CHECKING:
     from backend.axis.power import PowerState
 
-#: A status word that was read longer ago says nothing of now.
+#: Greatest age of a reading that counts as the present state [s].
 _SEEN_S = 2.5
 
 
 async def brake_then_quick_stop(power: PowerState) -> None:
-    """Brake by halt, have the quick stop brake, then quick stop.
+    """Brake by speed control or halt, set 605Ah to an option that brakes, then send quick stop.
 
     A quick stop that would coast is sent only where nothing else brakes.
 
     Raises:
-        DriveError: no word reaches the drive.
+        DriveError: no control word reaches the drive.
     """
     drive, halted = power.drive, False
     if torque_coasts(drive):
@@ -40,7 +40,7 @@ async def brake_then_quick_stop(power: PowerState) -> None:
             power.stop_step(StepCode.QUICK_STOP)
             return
     elif known_settings(drive).halt_brakes and _seen_enabled(drive) and not power.quick_stop_out:
-        # Over an axis that is not enabled, or after a quick stop, this word would enable it.
+        # This word would enable an axis that is not enabled, or that is in a quick stop.
         halt = cia402.ENABLE_OPERATION | cia402.HALT
         await drive.stop_by(drive.require("control_word"), halt)
         power.stop_step(StepCode.HALT)
@@ -52,12 +52,12 @@ async def brake_then_quick_stop(power: PowerState) -> None:
 
 
 def quick_stop_coasts(drive: Drive) -> bool:
-    """By what was read last, a quick stop would not brake and something else would."""
+    """Whether a quick stop would coast according to the last readings."""
     return known_settings(drive).coasts or torque_coasts(drive)
 
 
 def torque_coasts(drive: Drive) -> bool:
-    """It is enabled in a torque mode, where this family's quick stop lets it coast."""
+    """Whether it is enabled in a torque mode in which this family's quick stop lets it coast."""
     profile = drive.profile
     if profile.quirk("torque_stop_by_slope") is None or Mode.PV not in drive.modes:
         return False
@@ -68,7 +68,7 @@ def torque_coasts(drive: Drive) -> bool:
 
 
 async def _take_speed_control(power: PowerState) -> bool:
-    """Profile velocity with the target 0: the drive brakes by 6084h."""
+    """Switch to Profile velocity with the target 0, in which the drive brakes by 6084h."""
     problem: Text | None = None
     drive = power.drive
     try:
@@ -101,15 +101,15 @@ async def _let_quick_stop_brake(power: PowerState) -> bool:
 
 
 def _seen_enabled(drive: Drive) -> bool:
-    """The status word that was read last, a moment ago, said so."""
+    """Whether a status word not older than `_SEEN_S` shows Operation enabled."""
     word = _seen(drive, drive.key("status_word"))
     return word is not None and drive.decode_state(word) is State.OPERATION_ENABLED
 
 
 def _seen(drive: Drive, key: str | None) -> int | None:
-    """What was read of this a moment ago."""
+    """Raw value of a reading not older than `_SEEN_S`; None where there is none."""
     reading = drive.readings.get(key or "")
     if reading is None or not isinstance(reading.raw, int) or reading.time is None:
         return None
-    # Where the clock was set back since, its age is not known.
+    # Where the clock was set back since, the age is negative and not known.
     return reading.raw if 0.0 <= time.time() - reading.time < _SEEN_S else None

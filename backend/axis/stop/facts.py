@@ -1,4 +1,4 @@
-"""What STOP did and what it reached, as typed facts; words are made of them at the edge."""
+"""Actions and result of STOP as typed facts; texts are made from them at the edge."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from drivers.texts.message import Text
 
 
 class Verdict(StrEnum):
-    """What the measured motion says of an axis after STOP."""
+    """Motion of an axis after STOP, as measured."""
 
     STOPPED = "stopped"
-    """Speed and position both say that it is at standstill."""
+    """Speed and position both show standstill."""
     COASTING = "coasting"
-    """It has no power and slows down by itself."""
+    """The axis has no power and slows down by itself."""
     STILL_MOVING = "still_moving"
-    """It goes on, or what it measures contradicts itself."""
+    """The axis still moves, or its speed and position contradict each other."""
     UNREACHABLE = "unreachable"
     """The drive was not reached, or does not report how it moves."""
 
 
 class StepCode(StrEnum):
-    """One thing that STOP did."""
+    """Kind of a step of STOP."""
 
     QUICK_STOP = "quick_stop"
     HALT = "halt"
     SPEED_CONTROL = "speed_control_taken"
-    """Out of a torque mode, in which this family's quick stop brakes nothing."""
+    """Change from a torque mode, in which this family's quick stop does not brake."""
     OPTION_SET = "quick_stop_option_set"
     OPTION_RESTORED = "quick_stop_option_restored"
     TRIGGER_CLEARED = "trigger_cleared"
@@ -38,7 +38,7 @@ class StepCode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class StopStep:
-    """A step that was tried. ``at_s`` counts from STOP; ``figures`` are raw values and rpm."""
+    """A step that was tried. ``at_s`` counts from STOP [s]; ``figures``: raw values and rpm."""
 
     code: StepCode
     at_s: float
@@ -50,10 +50,10 @@ class StopStep:
 
 @dataclass(frozen=True, slots=True)
 class AxisStop:
-    """What STOP reached at one axis.
+    """Result of STOP at one axis.
 
-    ``speed`` in the axis' unit of speed is what was measured last, None where nothing was;
-    ``travelled`` in its unit of position counts from STOP; ``took_s`` until the verdict.
+    ``speed``: measured last, in ``speed_unit``; None where none was measured. ``travelled``: travel
+    since STOP, in ``travel_unit``. ``took_s``: time from STOP to the verdict [s].
     """
 
     drive: str
@@ -66,4 +66,4 @@ class AxisStop:
     steps: tuple[StopStep, ...] = ()
     problem: Text | None = None
     superseded: bool = False
-    """Somebody began a new motion before the verdict."""
+    """Whether somebody began a new motion before the verdict."""

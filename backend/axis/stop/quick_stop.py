@@ -1,7 +1,7 @@
-"""How hard a drive brakes on STOP, next to how hard a motion brakes by itself.
+"""Deceleration of STOP, raised to at least that of the motion itself.
 
-Quick stop brakes by 6085h (CiA 402-2 clause 8.4.6), which some makers ship at a sixtieth of what
-people move with: an R6L's 131072 inc/s² are 60 rpm/s, so STOP from 300 rpm would take 5 s.
+Quick stop brakes by 6085h (CiA 402-2 clause 8.4.6), whose default is with some makers a sixtieth
+of usual decelerations: an R6L's 131072 inc/s² are 60 rpm/s, so STOP from 300 rpm would take 5 s.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from backend.drive.optional import existing
 from backend.scales.units import AxisUnits
 from profiles.schema import Parameter, Raw
 
-#: From any permitted speed to standstill, as `drivers.motion.playback` ramps setpoints down.
+#: Time from any permitted speed to standstill [s], as `drivers.motion.playback` ramps down.
 STOP_S = 0.1
 
 
 def quick_stop_keys(drive: Drive) -> tuple[str, ...]:
-    """Keys that `raise_quick_stop` may change: the option code, and the deceleration of quick stop
-    where it can be compared with the profile's.
+    """Keys that `raise_quick_stop` may change.
+
+    These are the option code (605Ah), and the quick stop deceleration where it can be compared with
+    the profile deceleration.
     """
     pair = _pair(drive)
     option = drive.profile.by_key.get(OPTION)
@@ -31,10 +33,10 @@ def quick_stop_keys(drive: Drive) -> tuple[str, ...]:
 
 
 async def raise_quick_stop(drive: Drive, before: Mapping[str, Raw]) -> None:
-    """Let STOP brake at least as hard as the motion that is about to begin; lower nothing.
+    """Make STOP brake at least as hard as the motion that is about to begin; lower no value.
 
-    An option code by which a quick stop coasts is changed to one that brakes. The caller restores
-    what `quick_stop_keys` names, to the values in ``before``.
+    An option code with which a quick stop coasts is changed to one that brakes. The caller restores
+    the keys of `quick_stop_keys` to the values in ``before``.
     """
     await _let_it_brake(drive, before)
     pair = _pair(drive)
@@ -51,18 +53,18 @@ async def raise_quick_stop(drive: Drive, before: Mapping[str, Raw]) -> None:
 async def raise_quick_stop_from(
     drive: Drive, units: AxisUnits, speed_rpm: float, before: Mapping[str, Raw]
 ) -> None:
-    """Let a quick stop end a motion of this speed within `STOP_S`; lower nothing.
+    """Make a quick stop end a motion of this speed within `STOP_S`; lower no value.
 
-    It is the only brake of an axis without a loop: one that leaves its envelope at 1500 rpm would
-    go on for 25 s and 310 revolutions with the 60 rpm/s that an R6L is shipped with.
-    The caller restores what `quick_stop_keys` names, to the values in ``before``.
+    Quick stop is the only means of braking an axis without a cyclic loop: an axis that leaves its
+    envelope at 1500 rpm would continue for 25 s and 310 revolutions with the default of an R6L,
+    60 rpm/s. The caller restores the keys of `quick_stop_keys` to the values in ``before``.
     """
     await _let_it_brake(drive, before)
     pair = _pair(drive)
     if pair is None or pair[0].unit != units.spec.acceleration:
         return
     if not units.scales.acceleration.certain:
-        # It is not known what a larger number would do; the drive's own ramp stays.
+        # The effect of a larger number is not known; the drive's own ramp stays.
         return
     quick, needed = before.get(pair[0].key), units.acceleration_raw(speed_rpm / STOP_S)
     if isinstance(quick, int) and quick < needed:
@@ -70,7 +72,7 @@ async def raise_quick_stop_from(
 
 
 async def _let_it_brake(drive: Drive, before: Mapping[str, Raw]) -> None:
-    """605Ah = 0 takes the power off; the length of a motion it is another."""
+    """Replace 605Ah = 0 (power off, the axis coasts) by an option that brakes."""
     option = braking_option(drive)
     if before.get(OPTION) == COAST and option is not None:
         await drive.write(OPTION, option)

@@ -1,8 +1,8 @@
 """How a drive brakes on a quick stop and on halt: 605Ah, 605Dh and the ramps in force.
 
-CiA 402-2 objects 605Ah and 605Dh: 0 switches the power off (605Ah) or the drive function (605Dh)
-so that the axis coasts, 1 and 5 use 6084h, 2 and 6 use 6085h, 3, 4, 7 and 8 the limits of current
-and voltage.
+CiA 402-2 objects 605Ah and 605Dh: 0 switches off the power (605Ah) or the drive function (605Dh)
+so that the axis coasts; 1 and 5 use 6084h; 2 and 6 use 6085h; 3, 4, 7 and 8 use the limits of
+current and voltage.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from backend.scales.units import AxisUnits
 
 OPTION, HALT_OPTION = "605A:00", "605D:00"
 COAST = 0
-#: Options that brake, the one first that a quick stop is for: 6085h, then off; 6084h, then off.
+#: Options that brake, in order of preference; first 2: brake by 6085h, then Switch on disabled.
 _BRAKING = (2, 6, 1, 5, 3, 4, 7, 8)
 _SLOW, _QUICK = (1, 5), (2, 6)
 
 
 @dataclass(frozen=True, slots=True)
 class StopSettings:
-    """As they were read last; None is an object that the drive lacks or does not report."""
+    """Stop settings as read last; None for an object that the drive lacks or does not report.
+
+    ``slow``: raw 6084h; ``quick``: raw 6085h.
+    """
 
     option: int | None = None
     halt_option: int | None = None
@@ -32,16 +35,19 @@ class StopSettings:
 
     @property
     def coasts(self) -> bool:
-        """A quick stop takes the power off instead of braking."""
+        """Whether a quick stop switches the power off instead of braking."""
         return self.option == COAST
 
     @property
     def halt_brakes(self) -> bool:
-        """Bit 8 of the control word brakes, as far as is known."""
+        """Whether halt (bit 8 of the control word) brakes; assumed where 605Dh is not known."""
         return self.halt_option != COAST
 
     def ramp_raw(self) -> int | None:
-        """The deceleration of a quick stop in the drive's unit; None where no ramp rules."""
+        """Raw deceleration that a stop uses; None where no ramp applies.
+
+        Where a quick stop would coast, this is the ramp of halt.
+        """
         if self.coasts:
             return self.slow if self.halt_option in (None, 1) else self.quick
         if self.option in _SLOW:
@@ -52,7 +58,7 @@ class StopSettings:
 
 
 def settings_keys(drive: Drive) -> list[str]:
-    """What `settings_of` looks at, where the drive is reached for it."""
+    """Keys that `settings_of` evaluates, as far as a connected port carries them."""
     named = [OPTION, HALT_OPTION, *_ramps(drive)]
     return [
         key
@@ -77,12 +83,12 @@ def settings_of(drive: Drive, readings: Mapping[str, Reading]) -> StopSettings:
 
 
 def known_settings(drive: Drive) -> StopSettings:
-    """By what was read or written last, without asking the drive."""
+    """The stop settings from the last readings, without a request to the drive."""
     return settings_of(drive, drive.readings)
 
 
 def braking_option(drive: Drive) -> int | None:
-    """A value of 605Ah that brakes and that the drive has; None where it has no such object."""
+    """A value of 605Ah that brakes and that the drive supports; None where there is none."""
     parameter = drive.profile.by_key.get(OPTION)
     if parameter is None or parameter.access != "rw":
         return None
@@ -92,7 +98,7 @@ def braking_option(drive: Drive) -> int | None:
 
 
 def deceleration_rpm_s(units: AxisUnits, raw: int | None) -> float | None:
-    """A raw ramp in rpm/s; None where its unit is not known."""
+    """A raw deceleration in rpm/s; None where its unit is not known."""
     if raw is None or raw <= 0:
         return None
     spec = units.spec

@@ -1,1 +1,1 @@
-"""One archive of a station: database, sets and recordings, written, copied and restored."""
+"""Backup and restore of a station as one archive: database, sets and recordings."""

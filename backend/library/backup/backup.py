@@ -1,8 +1,8 @@
-"""Backup of a station: one archive with everything that it keeps, each part with its SHA-256.
+"""Backup of a station: one archive with all its stored data, each part with its SHA-256.
 
-The archive is a zip: ``manifest.json``, ``station.db`` (the database of the state folder, taken
+The archive is a zip: ``manifest.json``, ``station.db`` (the database of the state folder, copied
 while the server runs), ``shared.db`` (library and audit of a PostgreSQL server, as an SQLite file)
-and ``state/…`` (all other files of the state folder). It appears under its name when it is whole.
+and ``state/…`` (all other files of the state folder). It gets its name only when it is complete.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ FORMAT = "servodeck backup"
 VERSION = 1
 MANIFEST, STATION, SHARED, STATE = "manifest.json", "station.db", "shared.db", "state/"
 _CHUNK = 1 << 20
-#: Databases are copied by themselves; the lock belongs to a running process; nvm is the memory of
-#: virtual drives.
+#: Not copied as files: databases are copied separately, the lock belongs to a running process, and
+#: nvm is the memory of virtual drives.
 _LEFT_OUT = frozenset({FILE, f"{FILE}-wal", f"{FILE}-shm", f"{FILE}-journal", "servodeck.lock"})
 _FOLDERS_LEFT_OUT = frozenset({"nvm"})
-#: Packed already, or samples that hardly shrink.
+#: Files that are compressed already, or samples that hardly shrink.
 _STORED = frozenset({".sdrec", ".sdmeas", ".zip", ".rrd", ".mcap", ".pdf"})
 
 
 class BackupFailed(NotAllowed):
-    """A backup could not be made or is not whole; nothing was changed."""
+    """A backup could not be made or is not complete; nothing was changed."""
 
     kind = "backup-failed"
 
@@ -56,11 +56,11 @@ class Part:
 def make_backup(
     store: Store, archive: Path, *, recordings: bool = True, overwrite: bool = False
 ) -> dict[str, Part]:
-    """Write the archive; returns its parts by name. Blocks; the server may run meanwhile.
+    """Write the archive; return its parts by name. Blocks; the server may run meanwhile.
 
     Raises:
-        BackupFailed: the file exists, or the audit's chain is broken.
-        StorageFailed: disk or database; no archive then.
+        BackupFailed: the file exists, the database is damaged, or the audit's chain is broken.
+        StorageFailed: an error of disk or database; no archive is left.
     """
     if archive.exists() and not overwrite:
         raise BackupFailed("store.exists-already", value=str(archive), archive=str(archive))
@@ -84,7 +84,7 @@ def make_backup(
 
 
 def _write(store: Store, file: Path, folder: Path, *, recordings: bool) -> dict[str, Part]:
-    """Databases first: a row's file was there before the row was."""
+    """Write the archive; databases first, as each file exists before its row."""
     parts: dict[str, Part] = {}
     databases = {STATION: store.folder / FILE} if (store.folder / FILE).exists() else {}
     copies = {name: _online_copy(path, folder / name) for name, path in databases.items()}
@@ -113,7 +113,7 @@ def _write(store: Store, file: Path, folder: Path, *, recordings: bool) -> dict[
 
 
 def _online_copy(source: Path, target: Path) -> Path:
-    """SQLite's own backup: one consistent state, also while others write.
+    """Copy a database by SQLite's own backup: one consistent state, also while others write.
 
     Raises:
         BackupFailed: the database is damaged.
@@ -149,7 +149,7 @@ def _shared_copy(store: Store, folder: Path) -> Path:
 
 
 def _checked_head(database: Path | None) -> str:
-    """Number and hash of the audit's last entry: an anchor outside the database.
+    """Check the audit's chain; number and hash of its last entry, as an anchor for the manifest.
 
     Raises:
         BackupFailed: the chain is broken.
@@ -180,7 +180,7 @@ def _files(folder: Path, *, recordings: bool) -> Iterator[Path]:
 
 
 def _add(archive: zipfile.ZipFile, name: str, path: Path) -> Part:
-    """Copy and hash in one pass: a file that grows meanwhile is what was copied of it."""
+    """Copy and hash a file in one pass, so that the hash fits also where the file grows."""
     info = zipfile.ZipInfo.from_file(path, name, strict_timestamps=False)
     packed = zipfile.ZIP_STORED if path.suffix in _STORED else zipfile.ZIP_DEFLATED
     info.compress_type = packed
@@ -197,10 +197,10 @@ def _add(archive: zipfile.ZipFile, name: str, path: Path) -> Part:
 
 
 def read_manifest(archive: zipfile.ZipFile, shown: str) -> dict[str, Part]:
-    """Parts by name, all of them plain relative names, and none other in the archive.
+    """Parts by name, after a check that the archive contains exactly these, with safe names.
 
     Raises:
-        BackupFailed: not a backup, of a newer version, or not whole.
+        BackupFailed: not a backup, of a newer version, or not complete.
     """
     try:
         with archive.open(MANIFEST) as file:
@@ -226,7 +226,7 @@ def read_manifest(archive: zipfile.ZipFile, shown: str) -> dict[str, Part]:
 
 
 def _is_safe(info: zipfile.ZipInfo) -> bool:
-    """A regular file within the folder that it is unpacked to."""
+    """Whether an entry is a regular file within the folder to which it is unpacked."""
     name = info.filename
     path = PurePosixPath(name)
     kind = (info.external_attr >> 16) & 0o170000
@@ -241,10 +241,11 @@ def _is_safe(info: zipfile.ZipInfo) -> bool:
 
 
 def unpack(archive: zipfile.ZipFile, parts: dict[str, Part], folder: Path, shown: str) -> None:
-    """Unpack and compare every part; never more bytes than the manifest says.
+    """Unpack and compare every part; not more bytes than the manifest states.
 
     Raises:
-        BackupFailed: damaged. OSError: the disk.
+        BackupFailed: a part is damaged.
+        OSError: an error of the disk.
     """
     for name, part in parts.items():
         inner = name.removeprefix(STATE)

@@ -1,4 +1,4 @@
-"""All rows of library and audit from one database to another, of either kind."""
+"""Copying all rows of library and audit from one database to another, SQLite or PostgreSQL."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from backend.store.health_tables import HealthBaseline, HealthRun
 from backend.store.library_tables import Content, Item, Tag, Version
 from drivers.errors import NotAllowed
 
-#: In the order in which they can be filled.
+#: Tables in the order in which they can be filled.
 _TABLES: tuple[type[Base], ...] = (
     Item, Content, Version, Tag, HealthRun, HealthBaseline, AuditEntry,
 )  # fmt: skip
@@ -23,10 +23,11 @@ _CHUNK = 500
 
 
 def copy_rows(source: Store, target: Store) -> int:
-    """Copy into a database without library and audit; returns how many rows. Blocks.
+    """Copy into a database without library and audit; return the number of rows. Blocks.
 
     Raises:
-        NotAllowed: the target has some already; nothing was changed. DatabaseFailed: likewise.
+        NotAllowed: the target has a library or audit already; nothing was changed.
+        DatabaseFailed: an error of a database; nothing was changed.
     """
     count = 0
     with source.reading(snapshot=True) as old, target.writing() as new:
@@ -57,7 +58,7 @@ def _require_empty(session: Session, shown: str) -> None:
 
 
 def _set_sequences(session: Session) -> None:
-    """Numbers given by hand do not move PostgreSQL's counters."""
+    """Set PostgreSQL's sequences, which do not advance when ids are inserted explicitly."""
     for table in _tables((Item, Version, HealthRun, HealthBaseline)):
         highest = session.scalar(select(func.max(table.c.id))) or 1
         sequence = func.pg_get_serial_sequence(table.name, "id")

@@ -1,4 +1,4 @@
-"""Restore of a station from a backup: checked as a whole first, then put in place at once."""
+"""Restore of a station from a backup: first checked as a whole, then put in place atomically."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from backend.store.lock import FolderLock
 
 @dataclass(frozen=True, slots=True)
 class Restored:
-    """What was put in place; ``aside`` is where the earlier state folder lies now."""
+    """Result of a restore; ``aside``: present path of the earlier state folder."""
 
     parts: int
     audit_entries: int
@@ -37,9 +37,9 @@ def restore(
     Blocks. An existing folder is refused, or with ``replace`` kept under another name.
 
     Raises:
-        BackupFailed: the archive is not whole, or the folder is in use; nothing was changed.
+        BackupFailed: the archive is not complete, or the folder is in use; nothing was changed.
         StateRefused: a newer servodeck made the backup; nothing was changed.
-        StorageFailed: disk or database; the state folder is as it was.
+        StorageFailed: an error of disk or database; the state folder is unchanged.
     """
     used = folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir())
     if used and not replace:
@@ -90,7 +90,7 @@ def _unpack(archive: Path, folder: Path) -> int:
 
 
 def _check(folder: Path, shown: str) -> int:
-    """The databases open, and the audit's chain is whole; entries of the audit."""
+    """Check that the databases open and the audit's chain is intact; number of audit entries."""
     state_version.check(folder)
     entries = 0
     for name in (FILE, SHARED):
@@ -123,7 +123,7 @@ def _fill(folder: Path, database: str) -> int:
 
 
 def _put_in_place(fresh: Path, folder: Path) -> Path | None:
-    """The new folder takes the old one's place, which is kept; back again if that fails."""
+    """Move the new folder in place of the old one, which is kept; undone on failure."""
     aside = None
     if folder.exists() and any(path.name != FolderLock.NAME for path in folder.iterdir()):
         aside = folder.with_name(f"{folder.name}.before-{datetime.now(UTC):%Y%m%d-%H%M%S}")

@@ -1,5 +1,5 @@
-"""A station in the cabinet (edge box): its name, and what each of its network ports is for.
+"""A station in the cabinet (edge box): its name, and the role of each network port.
 
-`kept` reads and writes them, `roles` checks them and keeps EtherCAT off the office's port, `shown`
-puts the address on the console, `announced` makes the name known in the office's network (mDNS).
+`kept` reads and writes them, `roles` checks them and refuses EtherCAT on the office port, `shown`
+prints the address on the console, `announced` publishes the name in the office network (mDNS).
 """

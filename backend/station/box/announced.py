@@ -1,4 +1,4 @@
-"""The name of the station in the office's network: NAME.local, by mDNS (RFC 6762)."""
+"""The name of the station in the office network: NAME.local, by mDNS (RFC 6762)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _SERVICE = "_https._tcp.local."
 async def announced(
     box: Box, addresses: Sequence[str], port: int, failed: Callable[[str], None]
 ) -> AsyncIterator[None]:
-    """Answer for the name on the ports with these IPv4 addresses, and on no others.
+    """Publish the name on the ports with these IPv4 addresses, and on no others.
 
-    Whoever serves goes on where that is not possible; ``failed`` is called with the reason, as
-    when another computer has the name.
+    Where that is not possible, ``failed`` is called with the reason (such as another computer with
+    the same name) and the server continues.
     """
     from zeroconf import Error, IPVersion
     from zeroconf.asyncio import AsyncServiceInfo, AsyncZeroconf
@@ -38,7 +38,7 @@ async def announced(
     )
     try:
         try:
-            # Asks first whether somebody has the name (clause 8.1), then announces it twice.
+            # Probes first whether the name is in use (clause 8.1), then announces it twice.
             await (await responder.async_register_service(service))
         except (OSError, Error) as error:
             failed(str(error) or type(error).__name__)

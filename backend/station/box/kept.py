@@ -1,6 +1,6 @@
-"""Name and roles of the ports, kept in ``box.json`` in the state folder.
+"""Name and port roles of the station, stored in ``box.json`` in the state folder.
 
-Read whenever they are asked for: the terminal may change them while the server runs.
+Read at every use, as a command in a terminal may change them while the server runs.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FILE = "box.json"
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """``name`` as in the network, ``ethercat`` and ``office`` names of ports; empty for none."""
+    """Settings of the box: network ``name``, and names of the ports; empty for no port."""
 
     name: str
     ethercat: str = ""
@@ -25,10 +25,10 @@ class Box:
 
 
 def read(folder: Path) -> Box | None:
-    """What was set up; None where nothing was.
+    """The stored settings; None where nothing was set up.
 
     Raises:
-        NotAllowed: the file cannot be read. Then it is not known which port is the office's.
+        NotAllowed: the file cannot be read, so that the office port is not known.
     """
     file = folder / FILE
     try:
@@ -44,14 +44,14 @@ def read(folder: Path) -> Box | None:
 
 
 def keep(folder: Path, box: Box) -> None:
-    """Keep it in place of the one before, also of one that cannot be read.
+    """Store the settings in place of the earlier ones, also where those cannot be read.
 
     Raises:
-        StorageFailed: it cannot be written; the one before stays.
+        StorageFailed: the file cannot be written; the earlier one stays.
     """
     write_atomically(folder / FILE, json.dumps(asdict(box)).encode())
 
 
 def names_of(box: Box | None) -> frozenset[str]:
-    """Names under which a browser may come: the plain one, and that of mDNS (RFC 6762)."""
+    """Host names under which browsers may reach the box: the plain and the mDNS name (RFC 6762)."""
     return frozenset({box.name, f"{box.name}.local"}) if box else frozenset()

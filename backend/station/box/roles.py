@@ -1,4 +1,4 @@
-"""What a name and the roles of ports may be, and that no EtherCAT frame goes into the office."""
+"""Checks of the name and of the port roles; no EtherCAT on the office port."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text
 from drivers.urls import bus_kind, parse_url
 
-#: One label of a host name (RFC 1123, clause 2.1), in small letters.
+#: One label of a host name (RFC 1123, clause 2.1), in lower case.
 _NAME = re.compile(r"[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?")
 
 
 def checked(box: Box, ports: Sequence[Interface], used: str) -> Box:
-    """The same, with the name in small letters.
+    """Check the settings and return them with the name in lower case.
 
-    ``used`` is the port that the page came by, empty where that is not known.
+    ``used``: port over which the page is connected; empty where that is not known.
 
     Raises:
-        OutOfRange: no such name, or no such port.
-        NotAllowed: one port is to be both, or EtherCAT is to have the one that the page came by.
+        OutOfRange: not a valid name, or no such port.
+        NotAllowed: one port has both roles, or EtherCAT has the port of the page.
     """
     name = box.name.strip().lower()
     if not _NAME.fullmatch(name) or name == "localhost":
@@ -45,11 +45,11 @@ def checked(box: Box, ports: Sequence[Interface], used: str) -> Box:
 
 
 def require_not_office(folder: Path, url: str) -> None:
-    """EtherCAT floods a network with frames that no office computer understands.
+    """Refuse EtherCAT on the office port, as its frames would flood the office network.
 
     Raises:
-        NotAllowed: ``url`` is EtherCAT on the office's port, or it is not known which that is.
-        OutOfRange: no bus URL.
+        NotAllowed: ``url`` is EtherCAT on the office port, or the office port is not known.
+        OutOfRange: not a bus URL.
     """
     bus = parse_url(url)
     if not bus_kind(bus.scheme).traits.fills_network:
@@ -64,7 +64,7 @@ def require_not_office(folder: Path, url: str) -> None:
 
 
 def _same_port(one: str, other: str) -> bool:
-    """Also by another name that the system has for it."""
+    """Whether both names are of one port, also by an alternative name of the system."""
     try:
         return one == other or socket.if_nametoindex(one) == socket.if_nametoindex(other)
     except OSError:
@@ -72,7 +72,7 @@ def _same_port(one: str, other: str) -> bool:
 
 
 def port_of(address: str) -> str:
-    """The port that has this address; empty where none has, or it is the computer's own loop."""
+    """Name of the port with this IP address; empty for none and for loopback addresses."""
     for name, addresses in psutil.net_if_addrs().items():
         if any(one.address.split("%")[0] == address for one in addresses):
             return "" if _is_loop(address) else name

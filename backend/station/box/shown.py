@@ -1,4 +1,4 @@
-"""The address of the station on its console, for people and for the camera of a phone."""
+"""The address of the station on its console, as text and as QR code."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import psutil
 
 
 def phone_address(host: str, port: int) -> str:
-    """An address that needs no name server: where the station listens on all ports, that of the
-    one which faces the network.
+    """URL of the station that needs no name server.
+
+    Where the station listens on all ports, it has the address of the port towards the network.
     """
     if host in ("0.0.0.0", "::"):  # noqa: S104 - compared, not bound
         host = _outward() or socket.gethostname().lower()
@@ -27,7 +28,7 @@ def scan_code(address: str) -> str:
 
 
 def _outward() -> str:
-    """The address that faces the network; without a way out, the first of any port."""
+    """Address of the port with the default route; without a route, the first of any port."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             # A datagram socket sends nothing by connecting.

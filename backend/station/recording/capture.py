@@ -1,4 +1,4 @@
-"""Always armed: the last seconds of every axis, frozen into a support bundle on a fault."""
+"""Fault capture: the last seconds of every axis, stored in a support bundle on a fault."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from drivers.texts import limits
 from drivers.texts.message import text
 
 SUFFIX = ".zip"
-#: Seconds before and after the fault.
+#: Time stored before and after the fault [s].
 BEFORE_S, AFTER_S = 10.0, 2.0
-#: Bounds of the rings; older things go first.
+#: Limits of the ring buffers; the oldest entries are dropped first.
 MAX_BLOCK_BYTES = 128 * 1024 * 1024
 MAX_VALUES = 200_000
 LOG_ENTRIES = 500
-#: A fault that comes and goes makes one bundle in this time.
+#: A recurring fault makes one bundle within this time [s].
 PAUSE_S = 30.0
 KEEP_BUNDLES = 50
-#: How often a bundle that the disk did not take is tried again.
+#: Period of retries for a bundle that could not be written [s].
 AGAIN_S = 20.0
-#: A drive with a fault may answer slowly; then the values known before are taken.
+#: Time limit for reading a drive [s]; one with a fault may be slow, and known values are used then.
 READ_TIMEOUT_S = 10.0
 
 OnFault = Callable[[str, str], None]
@@ -51,17 +51,17 @@ OnFault = Callable[[str, str], None]
 
 @dataclass(eq=False, slots=True)
 class _Tap:
-    """The cyclic stream of one drive into the ring."""
+    """Subscription of the ring buffer to the cyclic stream of one drive."""
 
     subscription: Subscription
     channels: tuple[tuple[str, str], ...]
 
 
 class FaultCapture:
-    """Rings of the last seconds. Costs the buses nothing: it hears what is read anyway.
+    """Ring buffers of the last seconds, without bus load: only values read anyway are stored.
 
-    What the cyclic exchange carries is kept with every cycle; on polled buses every value that
-    the monitor, a page or a tool reads is kept with its time.
+    Process data are stored for every cycle; on polled buses every value that the monitor, a page
+    or a tool reads is stored with its time.
     """
 
     def __init__(self, bench: Bench, folder: Path, on_fault: OnFault) -> None:
@@ -83,7 +83,7 @@ class FaultCapture:
         bench.on_drives.append(self._drives)
 
     async def close(self) -> None:
-        """Leave the streams; a bundle that is being made is finished first."""
+        """End the subscriptions; a bundle in progress is finished first, within a time limit."""
         self._bench.on_snapshot.remove(self._snapshot)
         self._bench.on_readings.remove(self._readings)
         self._bench.on_drives.remove(self._drives)
@@ -94,7 +94,7 @@ class FaultCapture:
         for drive in list(self._taps):
             self._untap(drive)
 
-    # --- the rings --------------------------------------------------------------------
+    # --- ring buffers -----------------------------------------------------------------
 
     def _drives(self) -> None:
         """Follow the cyclic exchanges as they start and end."""
@@ -130,7 +130,7 @@ class FaultCapture:
         self._forget_old()
 
     def _forget_old(self) -> None:
-        """What an exchange brought that ended long ago is no evidence of anything new."""
+        """Drop old entries, also of an exchange that has ended."""
         oldest = time.monotonic() - BEFORE_S - AFTER_S
         while self._blocks and (self._blocks[0][0] < oldest or self._block_bytes > MAX_BLOCK_BYTES):
             self._block_bytes -= self._blocks.popleft()[2].samples.nbytes
@@ -141,7 +141,7 @@ class FaultCapture:
     def _readings(self, drive: str, readings: list[Reading]) -> None:
         now = time.time()
         for reading in readings:
-            # `mark_saved` and the like repeat old readings; those are no news.
+            # `mark_saved` and similar calls repeat old readings, which are not stored again.
             if reading.time is None or now - reading.time > 1.0:
                 continue
             value = reading.value.hex() if isinstance(reading.value, bytes) else reading.value
@@ -156,7 +156,7 @@ class FaultCapture:
         now = {f.code: f for f in snapshot.faults if f.kind == "fault"}
         before = self._faults.get(drive)
         self._faults[drive] = frozenset(now)
-        # A fault that is there when a drive is connected has no past that we have seen.
+        # A fault present when the drive is connected has no recorded history.
         new = [f for code, f in now.items() if before is not None and code not in before]
         if not new:
             return
@@ -174,7 +174,7 @@ class FaultCapture:
             self._task = asyncio.create_task(self._freeze(time.time()), name="fault-capture")
 
     async def _freeze(self, when: float) -> None:
-        """After the last of the story was heard, write it down; again if more came meanwhile."""
+        """Write a bundle `AFTER_S` after the fault; repeat where further faults came meanwhile."""
         while self._pending:
             await asyncio.sleep(AFTER_S)
             reason = "; ".join(self._pending)
@@ -195,8 +195,9 @@ class FaultCapture:
         self._bench.journal.add(line, level="warning")
 
     def _hold(self, evidence: Evidence) -> None:
-        """Keep what could not be written until it can be. The first cause stays, later ones go:
-        they are in the log, and memory is not for all of them.
+        """Keep a bundle that could not be written in memory until it can be written.
+
+        Only the first one is kept, to limit memory; later ones are in the log only.
         """
         if self._held is not None and not self._held.done():
             return
@@ -218,10 +219,10 @@ class FaultCapture:
     # --- bundles ----------------------------------------------------------------------
 
     async def bundle(self, reason: str, *, when: float | None = None) -> str:
-        """Make a support bundle now; returns its file name.
+        """Make a support bundle now; return its file name.
 
         Raises:
-            StorageFailed: no space.
+            StorageFailed: not enough disk space.
         """
         return await self._write(await self._evidence(reason, when or time.time()))
 
@@ -242,7 +243,7 @@ class FaultCapture:
         return path.name
 
     async def _evidence(self, reason: str, when: float) -> Evidence:
-        # The rings go on; what matters is used before the slow reading of parameters.
+        # The ring buffers continue to run: copy them before the slow reading of parameters.
         self._forget_old()
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
         connected_drives = list(self._bench.connected_drives.values())
@@ -283,7 +284,7 @@ class FaultCapture:
         )
 
     def _names(self, values: list[Value]) -> dict[tuple[str, str], str]:
-        """What the values are, for those who read the page without the station."""
+        """Names and units of the values, for reading the bundle without the station."""
         names = {}
         for drive_id, key in {(v.drive, v.key) for v in values}:
             if (connected := self._bench.connected_drives.get(drive_id)) is not None:
@@ -306,7 +307,7 @@ class FaultCapture:
         return path
 
     def names(self) -> list[str]:
-        """Bundles, newest first."""
+        """File names of the bundles, newest first."""
         found = sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: -p.stat().st_mtime)
         return [path.name for path in found if not path.name.startswith(".")]
 

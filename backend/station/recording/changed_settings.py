@@ -1,4 +1,4 @@
-"""Settings that become others while somebody records or looks on."""
+"""Detection of settings that change during a recording or a live view."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from backend.drive.readings import Reading
 from backend.station.bench import Bench
 from drivers.texts.message import Text, text
 
-#: Commands, which a motion writes twenty times a second, are no settings; the mode is one.
+#: Roles of commands, which a motion writes many times a second, so no settings; the mode is one.
 _COMMANDS = tuple(role for role in OUTPUT_ROLES if role != "mode")
 
 
 class ChangedSettings:
-    """Compares every reading of what can be written with the one before, from `begin` on."""
+    """Compares every reading of a writable parameter with the one before, from `begin` on."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
         self._known: dict[tuple[str, str], object] = {}
 
     def begin(self) -> None:
-        """What is known of the drives by now is what they had before."""
+        """Take the last known readings of all drives as the values to compare with."""
         for drive_id, connected in self._bench.connected_drives.items():
             for key, reading in connected.drive.readings.items():
                 if reading.raw is not None:
                     self._known.setdefault((drive_id, key), reading.raw)
 
     def forget(self) -> None:
-        """Nobody records or looks any more."""
+        """Discard the values, as no recording or live view runs any more."""
         self._known.clear()
 
     def among(self, drive_id: str, readings: Iterable[Reading]) -> list[tuple[str, Text]]:
-        """Key and message of each setting that is another one now."""
+        """Key and message of each setting among these readings that has changed."""
         connected = self._bench.connected_drives.get(drive_id)
         if connected is None:
             return []

@@ -1,4 +1,4 @@
-"""What is written down about the axes next to the samples: identity, parameters, link, faults."""
+"""Data about the axes that is stored with samples: identity, parameters, links, faults."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from drivers.errors import DriveError
 from drivers.link import LinkQuality
 from drivers.texts.answers import sentence
 
-#: A mute drive must not keep the samples of the others waiting.
+#: Time limit [s], so that a drive without answer does not delay the samples of the others.
 GEARING_TIMEOUT_S = 2.0
 
 
@@ -28,7 +28,7 @@ def _figures(now: LinkQuality) -> dict[str, object]:
 
 
 def identity(bench: Bench, connected: ConnectedDrive) -> dict[str, Any]:
-    """Who the axis is."""
+    """Identity of the axis."""
     drive = connected.drive
     found = drive.found
     return {
@@ -46,10 +46,10 @@ def identity(bench: Bench, connected: ConnectedDrive) -> dict[str, Any]:
 async def parameters(
     connected: ConnectedDrive, *, fresh: bool, timeout_s: float
 ) -> list[dict[str, Any]]:
-    """Settings of the drive with the time each was read; what cannot be read states the reason.
+    """Settings of the drive, each with the time of its reading, or the reason why there is none.
 
-    ``fresh`` reads all of them now, else only those that were never read. After ``timeout_s``
-    it goes on with what it has.
+    ``fresh`` reads all of them now, otherwise only those that were never read. After ``timeout_s``
+    [s] the values known by then are used.
     """
     drive = connected.drive
     wanted = [
@@ -74,7 +74,7 @@ def _row(connected: ConnectedDrive, reading: Reading | None, key: str) -> dict[s
 
 
 async def gearing(connected: ConnectedDrive) -> None:
-    """Have the units of the axis known where its drive answers in time.
+    """Read the units of the axis, where its drive answers in time.
 
     Without them the drive's own units are shown.
     """
@@ -84,9 +84,9 @@ async def gearing(connected: ConnectedDrive) -> None:
 
 
 async def past_faults(connected: ConnectedDrive, *, timeout_s: float) -> dict[str, Any]:
-    """The drive's own fault record as far as reading is enough: ``records``, or ``why`` not.
+    """The drive's fault history, as far as no write is needed: ``records``, or ``why`` not.
 
-    A record that is chosen by a write is left alone: nobody asked for a write.
+    A history whose records are selected by a write is not read, as nobody requested a write.
     """
     drive, history = connected.drive, history_of(connected.drive)
     if history is None or history.kind == "unreadable":

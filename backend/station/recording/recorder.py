@@ -1,4 +1,4 @@
-"""One running recording: subscribed to its channels, waiting for its trigger, writing."""
+"""One running recording: subscriptions to its channels, trigger and writer."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from drivers.link import ScopeBlock
 from drivers.texts.message import Text, text
 
 FORMAT = 1
-#: Reading the settings of a slow drive must not keep a recording from beginning.
+#: Time limit for reading settings [s], so that a slow drive does not prevent a recording.
 PARAMETERS_TIMEOUT_S = 5.0
-#: A stream that brought nothing for this long is reported.
+#: Time without samples after which a stream is reported [s].
 SILENT_S = 2.0
-#: Memory for what comes before the trigger.
+#: Memory for samples before the trigger.
 MAX_PRE_BYTES = 256 * 1024 * 1024
 
 Phase = Literal["preparing", "waiting", "recording", "ended"]
@@ -39,7 +39,7 @@ Phase = Literal["preparing", "waiting", "recording", "ended"]
 
 @dataclass(frozen=True, slots=True)
 class Trigger:
-    """When a waiting recording begins. ``mask`` looks at single bits of ``change``."""
+    """Condition that begins a waiting recording. ``mask``: bits that ``change`` compares."""
 
     kind: Literal["rising", "falling", "change", "fault"]
     drive: str
@@ -50,7 +50,7 @@ class Trigger:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What to record. ``duration_s`` counts from the beginning, or from the trigger."""
+    """Settings of a recording. ``duration_s`` counts from the beginning, or from the trigger."""
 
     name: str
     channels: tuple[tuple[str, str], ...]
@@ -64,7 +64,7 @@ class Settings:
 
 
 EndReason = Literal["stopped", "its time is over", "failed", "servodeck was ended"]
-"""Why a recording ended; its file keeps this word."""
+"""Why a recording ended; stored in its file."""
 
 
 @dataclass(eq=False, slots=True)
@@ -79,7 +79,7 @@ class _Stream:
 
 
 class Recorder:
-    """A recording from `start` to `stop`. All methods are of the event loop."""
+    """A recording from `start` to `stop`. All methods run on the event loop."""
 
     def __init__(
         self,
@@ -113,16 +113,16 @@ class Recorder:
         return self.path.name
 
     def written(self) -> Written:
-        """Figures up to now."""
+        """Figures of the file up to now."""
         return self._writer.written() if self._writer is not None else Written()
 
     @property
     def lost(self) -> int:
-        """Samples that the bus or the sampler lost before they came here."""
+        """Number of samples that the bus or the sampler lost before they reached the recorder."""
         return self._lost
 
     def synchronous(self) -> frozenset[tuple[str, str]]:
-        """Channels that come with every cycle of their bus."""
+        """Channels that are sampled in every cycle of their bus."""
         return frozenset(c for s in self._streams if s.subscription.synchronous for c in s.channels)
 
     # --- beginning --------------------------------------------------------------------
@@ -146,7 +146,8 @@ class Recorder:
         """Read the settings that are not known, subscribe, and open the file.
 
         Raises:
-            NotAllowed: no such drive or key. StorageFailed: the file cannot be written.
+            NotAllowed: no such drive or key.
+            StorageFailed: the file cannot be written.
         """
         columns: dict[str, list[str]] = {}
         for drive, key in self.settings.channels:
@@ -211,13 +212,13 @@ class Recorder:
     # --- samples ----------------------------------------------------------------------
 
     def _take(self, stream: _Stream, block: ScopeBlock) -> None:
-        """A block, as soon as the bus delivered it."""
+        """Take a block as soon as the bus has delivered it."""
         stream.heard = time.monotonic()
         if stream.silent:
             stream.silent = False
             self.event("samples", f"{stream.channels[0][0]} delivers samples again")
         if stream.first:
-            # What was lost before it began is no loss of the recording.
+            # Samples lost before the recording began do not count.
             block = replace(block, dropped=0)
         elif block.dropped:
             self._lost += block.dropped
@@ -234,7 +235,7 @@ class Recorder:
                 self._begin("triggered")
 
     def _forget_old(self) -> None:
-        """Keep the time before the trigger; without a trigger everything from the start on."""
+        """Drop blocks older than the time before the trigger; without a trigger keep all."""
         if self.settings.trigger is None:
             return
         oldest = time.monotonic() - self.settings.pre_s
@@ -260,7 +261,7 @@ class Recorder:
         return fires(trigger, values)
 
     def fault(self, drive: str, text: str) -> None:
-        """A fault came up on a drive."""
+        """Record a new fault of a drive as an event; it may be the trigger."""
         self.event("fault", text, "error", drive=drive)
         trigger = self.settings.trigger
         fits = trigger is not None and trigger.kind == "fault" and trigger.drive in ("", drive)
@@ -268,7 +269,7 @@ class Recorder:
             self._begin("triggered")
 
     def event(self, kind: str, text: str, level: str = "info", *, drive: str = "") -> None:
-        """Write down what happened, with the present time."""
+        """Write an event with the present time into the recording."""
         if self._writer is not None and self.phase in ("waiting", "recording"):
             now = time.monotonic()
             self._writer.event(
@@ -276,7 +277,7 @@ class Recorder:
             )
 
     def concerns(self, drive: str | None) -> bool:
-        """Whether one of its channels is of this drive."""
+        """Whether one of its channels belongs to this drive; True for None."""
         return drive is None or any(d == drive for d, _ in self.settings.channels)
 
     def records(self, drive: str, key: str) -> bool:
@@ -298,10 +299,10 @@ class Recorder:
             )
 
     def trigger_now(self) -> None:
-        """Begin although the trigger did not come.
+        """Begin without waiting for the trigger any longer.
 
         Raises:
-            NotAllowed: it does not wait.
+            NotAllowed: the recording does not wait for a trigger.
         """
         if self.phase != "waiting":
             raise NotAllowed("recording.not-wait-trigger", value=self.phase, name=self.name)
@@ -310,7 +311,7 @@ class Recorder:
     # --- end --------------------------------------------------------------------------
 
     async def stop(self, reason: EndReason) -> None:
-        """End it. Calling again does nothing; a failure is reported in ``problem``."""
+        """End the recording. Further calls do nothing; a failure is reported in ``problem``."""
         if self.phase == "ended":
             return
         empty = self.phase != "recording"
@@ -323,7 +324,7 @@ class Recorder:
             with contextlib.suppress(StorageFailed):  # `_failed` shows it
                 await asyncio.to_thread(self._writer.close, {"reason": reason, "problem": ""})
             if empty and self.problem is None:
-                # Nothing was asked to be kept: the trigger never came.
+                # The trigger never came, so there is nothing to keep.
                 await asyncio.to_thread(self.path.unlink, missing_ok=True)
                 self.problem = text("recording.trigger-did-not-come")
         self._ended(self)
@@ -372,7 +373,7 @@ class Recorder:
 
 
 def fires(trigger: Trigger, values: npt.NDArray[np.float64]) -> bool:
-    """Whether a run of values, which begins with the last one before, meets the trigger."""
+    """Whether values [n], the first being the last one of the block before, meet the trigger."""
     if len(values) < 2:
         return False
     before, after = values[:-1], values[1:]
@@ -390,4 +391,4 @@ def fires(trigger: Trigger, values: npt.NDArray[np.float64]) -> bool:
 
 
 def _nowhere(_block: ScopeBlock) -> None:
-    """For what comes between the end of a recording and its leaving the stream."""
+    """Sink for blocks between the end of a recording and the end of its subscription."""

@@ -1,4 +1,4 @@
-"""Live samples for rerun's viewer: encoded once, pulled by every page, bounded everywhere."""
+"""Live samples for rerun's viewer: encoded once, pulled by every page, with bounded queues."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
     from backend.recording.rerun_layout import Plot
 
-#: Chunks a second: more cost the viewer, fewer are seen as jerks.
+#: Period of the chunks [s]: shorter ones load the viewer, longer ones look jerky.
 PERIOD_S = 0.05
-#: What waits for a page that does not pull; the oldest goes first.
+#: Data that waits for a page which does not pull; the oldest is dropped first.
 MAX_CLIENT_BYTES = 16 * 1024 * 1024
-#: Blocks that wait for the encoder.
+#: Largest number of blocks that wait for the encoder.
 MAX_BLOCKS = 4000
-#: Polled drives: 50 a second leaves the bus to others.
+#: Period of polled drives [s]: 50 requests a second leave bus time to others.
 POLL_S = 0.02
 MAGIC = 0x44464552
 _HEAD = struct.Struct("<IIII")
@@ -54,7 +54,7 @@ ROLES = (
 
 @dataclass(eq=False, slots=True)
 class FeedClient:
-    """One page. ``dropped`` counts the blobs that it lost since its last pull."""
+    """Queue of one page. ``dropped``: number of blobs lost since its last pull."""
 
     first: bytes = b""
     queue: deque[bytes] = field(default_factory=deque)
@@ -64,14 +64,14 @@ class FeedClient:
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
     def begin(self, session: int, first: bytes) -> None:
-        """A new recording: what waits of the old one is of no use."""
+        """Begin a new recording and drop what still waits of the old one."""
         self.session, self.first = session, first
         self.queue.clear()
         self.waiting_bytes = 0
         self.ready.set()
 
     def put(self, blob: bytes) -> None:
-        """Queue a blob; the oldest go where it is too much."""
+        """Queue a blob; the oldest are dropped above `MAX_CLIENT_BYTES`."""
         self.queue.append(blob)
         self.waiting_bytes += len(blob)
         while self.waiting_bytes > MAX_CLIENT_BYTES:
@@ -80,7 +80,7 @@ class FeedClient:
         self.ready.set()
 
     async def pull(self, timeout_s: float = 1.0) -> bytes:
-        """All that waits, as one frame; an empty one after ``timeout_s`` without anything."""
+        """All waiting blobs as one frame; an empty frame after ``timeout_s`` [s] without any."""
         if not self.first and not self.queue:
             self.ready.clear()
             with contextlib.suppress(TimeoutError):
@@ -94,7 +94,7 @@ class FeedClient:
 
 
 class RerunFeed:
-    """Runs while a page looks, for all drives of the bench."""
+    """Live feed of all drives of the bench; it runs while a page shows it."""
 
     def __init__(self, bench: Bench) -> None:
         self._bench = bench
@@ -113,7 +113,7 @@ class RerunFeed:
         bench.journal.listen(self._logged)
 
     def join(self) -> FeedClient:
-        """A page begins to look."""
+        """Add a page, and start the feed with the first one."""
         client = FeedClient()
         if not self.clients:
             self._settings.begin()
@@ -125,7 +125,7 @@ class RerunFeed:
         return client
 
     async def leave(self, client: FeedClient) -> None:
-        """It looks no longer; the last one ends the feed."""
+        """Remove a page; the feed ends with the last one."""
         self.clients.discard(client)
         if not self.clients:
             await self.close()
@@ -145,7 +145,7 @@ class RerunFeed:
             self._events.append(entry)
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
-        """A setting that became another one is a line of the text log."""
+        """Add a line to the text log for each setting that changed."""
         if not self.clients:
             self._settings.forget()
             return
@@ -189,7 +189,7 @@ class RerunFeed:
         }
 
     def _signature(self) -> object:
-        """What a change of the bench must change for the arrangement to be made again."""
+        """Value that changes when the plots must be laid out again."""
         sessions = {d: id(m.axis.session) for d, m in self._bench.connected_drives.items()}
         names = {d: m.drive.name for d, m in self._bench.connected_drives.items()}
         return self._wanted(), sessions, names
@@ -247,7 +247,7 @@ def _encode(
     blocks: list[tuple[int, ScopeBlock]],
     events: list[Entry],
 ) -> bytes:
-    """One chunk for each plot with all that came since the last time."""
+    """Encode one chunk for each plot with all samples since the last call."""
     from backend.recording import rerun_layout
 
     offset_ns = time.time_ns() - time.monotonic_ns()

@@ -1,4 +1,4 @@
-"""Recording as the server offers it: the running ones, the stored ones, and fault capture."""
+"""Recordings of a server: running ones, stored ones, and fault capture."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
 from drivers.texts.message import Text, text
 
-#: Running at once; each has a file and a thread.
+#: Largest number of running recordings; each has a file and a thread.
 MAX_RUNNING = 8
 _ENDS: dict[EndReason, Text] = {
     "stopped": text("journal.stopped"),
@@ -33,7 +33,7 @@ _ENDS: dict[EndReason, Text] = {
 
 
 class Recordings:
-    """Everything about recordings of one bench. ``open`` in the running event loop."""
+    """Recordings of one bench. Call `open` in the running event loop."""
 
     def __init__(self, bench: Bench, folder: Path) -> None:
         self.bench = bench
@@ -45,13 +45,13 @@ class Recordings:
         self._exporting: dict[tuple[str, str], Job] = {}
 
     def open(self) -> None:
-        """Arm the fault capture and listen."""
+        """Arm the fault capture and listen to journal and readings."""
         self.capture = FaultCapture(self.bench, self.library.folder / "bundles", self._fault)
         self.bench.journal.listen(self._logged)
         self.bench.on_readings.append(self._readings)
 
     async def close(self) -> None:
-        """End what runs, in order."""
+        """End all running recordings and the fault capture."""
         await asyncio.gather(*(r.stop("servodeck was ended") for r in self.running.values()))
         if self.capture is not None:
             await self.capture.close()
@@ -64,7 +64,9 @@ class Recordings:
         """Begin a recording, or begin to wait for its trigger.
 
         Raises:
-            NotAllowed: no such drive or key, a bad name, too many. StorageFailed: no space.
+            NotAllowed: no such drive or key, or an invalid name.
+            Busy: too many recordings run.
+            StorageFailed: not enough disk space.
         """
         if len(self.running) >= MAX_RUNNING:
             raise Busy(
@@ -90,7 +92,7 @@ class Recordings:
         return recorder
 
     def _canonical(self, settings: Settings) -> Settings:
-        """The same with the profile's keys, where makers' numbers were given."""
+        """The same settings with the profile's keys in place of makers' numbers."""
 
         def key(drive: str, given: str) -> str:
             return self.bench.connected(drive).drive.parameter(given).key
@@ -145,7 +147,7 @@ class Recordings:
         for name in gone:
             self.bench.journal.add(text("journal.recording-pruned", name=name))
 
-    # --- what is written down next to the samples ----------------------------------------
+    # --- events ------------------------------------------------------------------------
 
     def _fault(self, drive: str, text: str) -> None:
         for recorder in list(self.running.values()):
@@ -158,7 +160,7 @@ class Recordings:
                 recorder.event("log", entry.text, entry.level, drive=entry.drive or "")
 
     def _readings(self, drive: str, readings: list[Reading]) -> None:
-        """A setting that changed while something records is an event of it."""
+        """Record a setting that changed as an event of the running recordings."""
         if not self.running:
             self._changed.forget()
             return
@@ -173,7 +175,8 @@ class Recordings:
         """The file of a recording that does not run.
 
         Raises:
-            Busy: it runs. NotAllowed: there is none.
+            Busy: it runs.
+            NotAllowed: there is none.
         """
         path = self.library.existing(name)
         if path.name in self.running:
@@ -195,10 +198,11 @@ class Recordings:
         self.bench.journal.add(text("journal.recording-deleted", name=path.name))
 
     def export(self, name: str, kind: str) -> Job:
-        """Export a recording in a process of its own; the job's result names the file.
+        """Export a recording in a separate process; the job's result contains the file name.
 
         Raises:
-            Busy: it runs. NotAllowed: there is none, or no such format.
+            Busy: the recording still runs.
+            NotAllowed: there is no such recording or format.
         """
         source = self.require_ended(name)
         target = self.library.export_path(name, kind)
@@ -227,10 +231,10 @@ class Recordings:
 
 
 async def run_export(source: Path, target: Path, kind: str, progress: Progress) -> None:
-    """The export process, with its progress; it dies with the task.
+    """Run the export process and report its progress; the process ends with the task.
 
     Raises:
-        StorageFailed: it failed; its last words are in the message.
+        StorageFailed: it failed; the message contains the last line of its output.
     """
     process = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "backend.recording.export", str(source), str(target), kind,

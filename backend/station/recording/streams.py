@@ -1,4 +1,4 @@
-"""What is recorded of which axis, as a recording's header and a live view say it."""
+"""Description of streams and channels for the header of a recording and for live views."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def describe_streams(
 ) -> list[dict[str, Any]]:
     """The ``streams`` of a header; the channels' names are made unique.
 
-    Samples are in ``unit``; times ``shown_factor`` they are in ``shown_unit``, which the scope
-    shows. The two units are one where the axis' gearing is not known.
+    Samples are in ``unit``; multiplied by ``shown_factor`` they are in ``shown_unit``, the unit of
+    the scope. Both units are the same where the axis' gearing is not known.
     """
     names: dict[tuple[str, str], str] = {}
     for _, channels in streams:
