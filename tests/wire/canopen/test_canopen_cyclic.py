@@ -92,7 +92,10 @@ async def test_no_node_may_have_the_number_of_our_heartbeat(bench: Bench, option
         if option:
             await _cyclic(link).start()
         else:
-            with pytest.raises(NotAllowed, match="node 127 is on this bus"):
+            with pytest.raises(
+                NotAllowed,
+                match="node 127 has the number with which this computer sends its heartbeat",
+            ):
                 await _cyclic(link).start()
             await _run(link, [])
     finally:

@@ -315,7 +315,7 @@ async def test_value_that_is_no_8_bit_number_is_a_protocol_error(
     shelf.objects[0x6041, 0] = b"\x37\x02"
     with serving(port, {1: shelf}):
         link = await opened(f"mlink://{port}")
-        with pytest.raises(ProtocolError, match="no UINT8"):
+        with pytest.raises(ProtocolError, match="not a valid UINT8"):
             await link.read(1, Address(0x6041, 0, "UINT8"))
 
 

@@ -182,7 +182,7 @@ def test_small_values_fill_a_register() -> None:
     assert to_bytes(signed, b"\xff\xfd") == b"\xfd"
     assert to_bytes(signed, b"\x00\xfd") == b"\xfd"
     assert to_words(Place(0, 1, "UINT8", "low_first"), b"\xfd") == (0x00FD,)
-    with pytest.raises(ProtocolError, match="no UINT8"):
+    with pytest.raises(ProtocolError, match="not a valid UINT8"):
         to_bytes(Place(0, 1, "UINT8", "low_first"), b"\xff\xfd")
 
 
