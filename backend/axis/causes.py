@@ -6,6 +6,8 @@ state was refused, when a person looks for the reason.
 
 from __future__ import annotations
 
+import contextlib
+
 from backend.drive.drive import Drive
 from backend.drive.faults import integer
 from backend.drive.terminals import read_terminals
@@ -23,12 +25,9 @@ async def hints(drive: Drive) -> list[Text]:
     Values that cannot be read are left out, as the hints only explain another error.
     """
     found: list[Text] = []
-    try:
-        found += await _terminals(drive)
-        found += await _limits(drive)
-        found += await _mode(drive)
-    except DriveError:
-        return found
+    for source in (_terminals, _limits, _mode):
+        with contextlib.suppress(DriveError):
+            found += await source(drive)
     return found
 
 

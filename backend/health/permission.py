@@ -106,12 +106,16 @@ def due(permission: Permission, now: datetime) -> datetime | None:
 
 
 def next_due(permission: Permission, now: datetime) -> datetime | None:
-    """The next due time after ``now``, in UTC; None without a schedule or after its end."""
+    """The next due time after ``now``, in UTC; None without a schedule or after its end.
+
+    A day without this local time (beginning of summer time) has none, as in `due`.
+    """
     local = now.astimezone()
-    for ahead in range(9):
+    for ahead in range(16):
         day = local.date() + timedelta(days=ahead)
         found = datetime.combine(day, permission.at).astimezone(UTC)
-        if day.weekday() in permission.days and found > now:
+        exists = found.astimezone().time() == permission.at
+        if day.weekday() in permission.days and exists and found > now:
             return found if found < permission.until else None
     return None
 

@@ -98,6 +98,8 @@ def net(changes: Iterable[Change]) -> tuple[NetChange, ...]:
         for key, raw in change.after.items():
             if key in change.before:
                 first.setdefault(key, change.before[key])
+            # Without a known value before, a later change is still the last one.
+            if key in first:
                 last[key] = (raw, change.time)
     return tuple(
         NetChange(key, first[key], raw, time)

@@ -31,10 +31,10 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
         raise BadRecording(
             "import.matlab-file-version-hdf5", value="7.3", limit=text("limit.version-7"), name=name
         )
-    five = data[:6] == b"MATLAB" or (len(data) > 128 and data[126:128] in {b"IM", b"MI"})
-    if not five:
+    if data[:6] == b"MATLAB" or (len(data) > 128 and data[126:128] in {b"IM", b"MI"}):
+        _refuse_bomb(data, name)
+    elif not _is_version_4(data):
         return None
-    _refuse_bomb(data, name)
     from scipy.io import loadmat
 
     try:
@@ -51,6 +51,28 @@ def read_matlab(data: bytes, name: str) -> tuple[tuple[str, ...], tuple[FloatArr
     if not columns:
         raise BadRecording("import.holds-no-vectors-numbers", value=name)
     return tuple(names), tuple(columns)
+
+
+def _is_version_4(data: bytes) -> bool:
+    """Whether the first matrix has a header of version 4, which nothing precedes.
+
+    The header (MAT-File Format, "Level 4"): type in decimal digits MOPT (byte order, 0, precision,
+    kind), rows, columns, whether there is an imaginary part, length of the name; then the name with
+    a zero at its end.
+    """
+    for order in "<>":
+        if len(data) < 20:
+            return False
+        kind, rows, columns, imaginary, length = struct.unpack(order + "5i", data[:20])
+        digits = divmod(kind, 1000)[0], kind // 100 % 10, kind // 10 % 10, kind % 10
+        if digits[0] != (order == ">") or digits[1] or digits[2] > 5 or digits[3] > 2:
+            continue
+        if min(rows, columns) < 0 or imaginary not in (0, 1) or not 1 < length <= 64:
+            continue
+        title = data[20 : 20 + length]
+        if title.endswith(b"\0") and title[:-1].isascii() and title[:-1].decode().isidentifier():
+            return True
+    return False
 
 
 def _refuse_bomb(data: bytes, name: str) -> None:

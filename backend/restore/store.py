@@ -165,7 +165,12 @@ class RestoreStore:
                 continue
             if note.in_motion and note.process != this_process() and lives(note.process):
                 known = Pending(
-                    tuple(values.values()), known.since, known.by, known.moved, note.by, None
+                    tuple(values.values()),
+                    known.since,
+                    known.by,
+                    known.moved,
+                    note.by,
+                    known.serial,
                 )
                 own = self._folder / f"{_slug(drive)}-{os.getpid()}.json"
                 continue

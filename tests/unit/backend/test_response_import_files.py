@@ -120,6 +120,13 @@ def test_matlab_vectors_structures_and_matrices() -> None:
             check(read(out.getvalue()))
 
 
+def test_matlab_of_version_4() -> None:
+    for variables in ({"t": T, "u": U, "y": Y}, {"m": np.column_stack([T, U, Y])}):
+        out = io.BytesIO()
+        savemat(out, variables, format="4")
+        check(read(out.getvalue()))
+
+
 @pytest.mark.parametrize(
     ("data", "said"),
     [
