@@ -1,8 +1,7 @@
 """Allow-list of the forms that the adapter in a bus URL may have.
 
 The adapter part of a bus URL comes from the network, from a saved list of drives or from a file,
-and
-the libraries below accept far more than adapter names: pyserial opens URLs of its own (``spy:``
+and the libraries below accept far more than adapter names: pyserial opens URLs of its own (``spy:``
 writes a file, ``socket:`` and ``rfc2217:`` connect to any computer, ``hwgrep:`` and ``alt:`` search
 and load code), python-can takes ``NAME@BAUD``, and merely opening a device that is not a serial
 port can have effects (a watchdog starts to count). Therefore only these forms are accepted:

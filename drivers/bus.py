@@ -1,8 +1,7 @@
 """Description of each kind of bus: the form of its URLs, its traits, and its link.
 
 The folder of a bus has a module ``bus`` with a `BusKind` named ``BUS``; no other code in the
-product
-names a kind of bus. See ``CONTRIBUTING.md``, "Add a bus".
+product names a kind of bus. See ``CONTRIBUTING.md``, "Add a bus".
 """
 
 from __future__ import annotations

@@ -96,8 +96,7 @@ def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
     """Return the power state that a status word reports.
 
     ``echoes_control``: bits 0–2 of this family's status word repeat the control word, and bit 7 is
-    the
-    alarm (manual 003:300-305).
+    the alarm (manual 003:300-305).
     """
     if echoes_control:
         if status_word & 0x80:
@@ -128,8 +127,7 @@ class Dialect:
 
     ``echoes_control`` as in `decode_state`; ``quick_stop`` is the control word of a quick stop; at
     least ``pause_s`` [s] lies between two steps towards Operation enabled; ``speed_mode`` is the
-    mode
-    that takes a velocity setpoint in every cycle (Profile velocity where there is no CSV).
+    mode that takes a velocity setpoint in every cycle (Profile velocity where there is no CSV).
     """
 
     echoes_control: bool = False

@@ -31,8 +31,7 @@ class DriveError(Exception):
 
     ``text`` states what happened: a catalogue code with its parameters, without words. ``drive``,
     ``parameter``, ``value`` and ``limit`` are facts that a user needs in any language;
-    `advice_text`
-    states what to do next. `message`, `remedy` and `advice` are these in English.
+    `advice_text` states what to do next. `message`, `remedy` and `advice` are these in English.
     """
 
     kind = "drive-error"

@@ -92,7 +92,7 @@ class FeedbackWatch:
         """Smallest step of 606Ch seen: an upper limit of its rounding."""
 
     def take(self, position: int, velocity: float, at_s: float) -> Contradiction | None:
-        """Add a sample of raw 6064h and 606Ch at a time [s]; return a contradiction once certain."""
+        """Add a sample of raw 6064h and 606Ch at a time [s]; return a contradiction when sure."""
         if self._undated:
             self._undated -= 1
             return None

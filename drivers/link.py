@@ -1,9 +1,8 @@
 """The interface between drives and buses.
 
 A `Link` is one opened bus. It transfers bytes and interprets neither units nor meaning. Values
-travel
-in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial link
-converts to and from its registers. The methods of a link are asynchronous; each link runs its
+travel in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial
+link converts to and from its registers. The methods of a link are asynchronous; each link runs its
 blocking code on a thread of its own, so that there is one transaction at a time per bus.
 """
 
