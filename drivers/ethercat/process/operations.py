@@ -464,7 +464,7 @@ class Operations:
         done(None, None)
 
     def _report_figures(self) -> None:
-        """Send figures before the reply, so that no earlier motion's end is taken for this one's."""
+        """Send figures before the reply, so that an earlier motion's end is not mistaken for it."""
         self._send({"event": "status"} | self.status())
 
     def status(self) -> Message:
