@@ -128,9 +128,7 @@ def require_ethercat_adapter(name: str) -> None:
 
 
 def _require_multicast(channel: str) -> None:
-    """Require a multicast address: any other would send frames to a computer of the caller's
-    choice.
-    """
+    """Require a multicast address; any other could be a computer that the caller chooses."""
     try:
         address = ipaddress.ip_address(channel)
     except ValueError:

@@ -33,9 +33,7 @@ class FixedPdo:
 
     @property
     def words(self) -> tuple[int | None, ...]:
-        """Mapping entries as in 16xxh and 1Axxh; None for unused bytes, of which only the length
-        counts.
-        """
+        """Mapping entries as in 16xxh and 1Axxh; None for unused bytes (only the length counts)."""
         return tuple(
             None
             if address is None

@@ -281,8 +281,7 @@ class NodeWatch:
         return events
 
     def guard_due(self, guard_s: float, now_s: float) -> tuple[list[int], list[LinkEvent]]:
-        """Return the nodes to guard now, and events for those without an answer to the last
-        request.
+        """Return the nodes to guard now, and events for those that did not answer last time.
 
         Only nodes that are in use and send no heartbeat are guarded.
         """

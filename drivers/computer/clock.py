@@ -7,9 +7,7 @@ import time
 
 
 def resolution_s() -> float:
-    """Return the resolution of `time.monotonic`: 15.6 ms on Windows before CPython 3.13, else < 1
-    µs.
-    """
+    """Return the resolution of `time.monotonic` [s]: 15.6 ms on Windows before CPython 3.13."""
     return time.get_clock_info("monotonic").resolution
 
 

@@ -69,9 +69,7 @@ class CanEvidence:
     error_register: int | None = None
     status_word: int | None = None
     own_status_word: bool = False
-    """The bits of 6041h are not those of CiA 402 (they echo the control word): bit 9 has no
-    meaning.
-    """
+    """The bits of 6041h are not those of CiA 402 (they echo the control word), nor is bit 9."""
     drive_error: int | None = None
     pdos_wanted: int = 0
     pdos_silent: tuple[int, ...] = ()

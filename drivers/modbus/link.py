@@ -60,9 +60,7 @@ _BUSY_S = 0.05
 _REOPEN_S = 0.25
 _STATIONS = range(1, 248)
 _ASKED_AGAIN = 4
-"""Number of silent addresses queried again after an unexpected answer, which one of them may have
-sent.
-"""
+"""Silent addresses queried again after an unexpected answer, which one of them may have sent."""
 _PLANS_KEPT = 256
 
 
