@@ -65,7 +65,7 @@ class FileUnits:
         return ("inc" if quantity == "position" and quantity not in self._held else ""), 1.0
 
     def spec(self, base: UnitSpec, present: frozenset[str]) -> UnitSpec:
-        """Return the profile's units; ``base`` has the standard's, ``present`` the existing keys."""
+        """Return the profile's units; ``base`` has the standard's, ``present`` existing keys."""
 
         def existing(key: str | None) -> str | None:
             return key if key in present else None
