@@ -128,8 +128,7 @@ class StartsWithNetwork(Protocol):
 
 @runtime_checkable
 class HasShaft(Protocol):
-    """A device with a motor, whose true shaft angle can be read, independent of objects and units.
-    """
+    """A device with a motor, whose true shaft angle is available independently of any object."""
 
     @property
     def shaft_rev(self) -> float:

@@ -145,8 +145,7 @@ class LoopReader:
         )
 
     def _third(self, inertia: float) -> ThirdGains | None:
-        """Return gains at standstill, while gain switching is on (R6L, P06.06 to P06.08, P06.56).
-        """
+        """Return gains at standstill while gain switching is on (R6L, P06.06-P06.08, P06.56)."""
         keys, switching = self._traits.third_gains, self._traits.switching
         if keys is None or switching is None or switching.third_delay is None:
             return None

@@ -84,7 +84,7 @@ class Cia402:
                 values[parameter.key] = parameter.to_raw(value * si_factor(parameter.unit))
         resolution = self._profile.by_key.get("608F:01")
         if resolution is not None and resolution.default_raw is None:
-            values[resolution.key] = spec.encoder.counts_per_rev  # what the drive reads from it
+            values[resolution.key] = spec.encoder.counts_per_rev  # as the drive reads it
         return values | unit_values(self._profile, spec.rough_feedback)
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:

@@ -148,8 +148,7 @@ class InputPin:
         return self._uses.get(int(self._function.active))
 
     def level(self, external: bool, pressed: int) -> bool:
-        """Return the logic level after polarity and forcing. ``pressed``: switches of the machine.
-        """
+        """Return the logic level after polarity and forcing. ``pressed``: active switches."""
         if self._virtual is not None and int(self._virtual.active) >> self._virtual_bit & 1:
             return True
         on = external

@@ -223,8 +223,7 @@ class M6l(Cia402):
     def refined(
         self, od: ObjectDictionary, motor: MotorData, base: ProtectionSettings
     ) -> ProtectionSettings:
-        """Apply P10.07, P10.09, P10.10, P10.12, P02.18 and P02.20 (000:3480-3485, 000:3245-3247).
-        """
+        """Apply P10.07, P10.09, P10.10, P10.12, P02.18, P02.20 (000:3480-3485, 000:3245-3247)."""
         resistor = int(od.number("2002:13"))
         external = float(od.number("2002:15"))
         over_speed = float(od.number("200A:0D"))
@@ -239,8 +238,7 @@ class M6l(Cia402):
         )
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """Return times by P01.17, P02.10 to P02.13 and an output with function 18 (000:1360-1425).
-        """
+        """Return times by P01.17, P02.10-P02.13 and an output with function 18 (000:1360-1425)."""
         assigned = any(od.number(f"2003:{sub:02X}", -1) == 18 for sub in range(0x10, 0x15))
         if od.number("2001:12") != 1 or not assigned:
             return None

@@ -106,8 +106,7 @@ class Mms7:
         return {}
 
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
-        """Return units by gear ratio and feed constant (004:1853-1948), polarity (004:7261-7272).
-        """
+        """Apply gear ratio and feed constant (004:1853-1948) and polarity (004:7261-7272)."""
         feed = od.number("6092:01", 65536) / max(od.number("6092:02", 1), 1)
         gear = od.number("6091:01", 1) / max(od.number("6091:02", 1), 1)
         per_rad = max(feed, 1) / (gear or 1) / TWO_PI
@@ -295,8 +294,7 @@ def _raw_row(profile: Profile, table: StiffnessTable, row: tuple[float, ...]) ->
 def _bandwidth_gains(
     position: float, speed: float, integral: float, inertia_kgm2: float
 ) -> GainSet:
-    """Convert bandwidths in 0.1 Hz to gains: the rigid plant 1/(J·s) crosses over at the bandwidth.
-    """
+    """Convert bandwidths in 0.1 Hz to gains: the crossover of the rigid plant 1/(J·s)."""
     kp = inertia_kgm2 * TWO_PI * speed * 0.1
     return GainSet(TWO_PI * position * 0.1, kp, kp * TWO_PI * integral * 0.1)
 
