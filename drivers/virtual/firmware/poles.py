@@ -80,8 +80,7 @@ class PoleIdentification:
         return _MISSING if self.needed and not by_itself else None
 
     def start(self, then: Callable[[], None] | None = None) -> bool:
-        """Start; ``then`` is called when the angle is known. Return False if the axis is not free.
-        """
+        """Start; call ``then`` when the angle is known. Return False if the axis is busy."""
         if self.active or (then is None and not self._free()):
             return False
         self._then = then

@@ -41,8 +41,7 @@ class GainSet:
 
 @dataclass(frozen=True, slots=True)
 class Switching:
-    """Switching to the second gains: ``kind`` is one of the kernel's SWITCH_*, levels in SI units.
-    """
+    """Switching to the second gains: ``kind`` is one of SWITCH_*, levels in SI units."""
 
     kind: int = 0
     level: float = 0.0

@@ -78,8 +78,7 @@ class Storage:
         )
 
     def restore(self) -> None:
-        """Restore factory values, in use and in the NVM. Raises SdoAbort if it cannot be written.
-        """
+        """Restore factory values, in use and in the NVM. Raises SdoAbort on failure."""
         self._store({})
         for entry in self._od:
             if entry.parameter.access != "ro" and entry.key not in self._volatile:

@@ -81,8 +81,7 @@ def _torque_share(p, angle):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
-    """Return the torque of a closed brake with an elastic hub, which slips at its holding torque.
-    """
+    """Return the torque of a closed brake: elastic hub, slipping at its holding torque."""
     most, stiffness = p[k.P_BRAKE_TORQUE], p[k.P_BRAKE_STIFFNESS]
     give = most / stiffness
     twist = angle - s[k.S_BRAKE_ANCHOR]
