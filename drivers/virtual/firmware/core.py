@@ -57,9 +57,7 @@ class Core:
         return raw / self.units.speed_per_rad_s
 
     def speed_at(self, key: str, default: Number = 0) -> float:
-        """Return a speed parameter in rad/s, converted from rpm if that is its unit (M6-L,
-        000:2167).
-        """
+        """Return a speed parameter in rad/s; its unit may be rpm (M6-L, 000:2167)."""
         return self.number(key, default) / self.speed_raw_per_rad_s(key)
 
     def speed_raw_per_rad_s(self, key: str) -> float:

@@ -57,9 +57,7 @@ class VirtualGantry:
         return done
 
     def _follow(self) -> None:
-        """Place the beam at rest between the present motor positions, with strained joints and
-        guides.
-        """
+        """Place the beam at rest between the present motor positions; joints may be strained."""
         spec = self.spec
         first, second = self.x[0], self.x[SECOND]
         joints, guides = 0.5 * spec.joint_stiffness_nm_per_rad, spec.yaw_stiffness_nm_per_rad

@@ -254,8 +254,9 @@ class Homing:
             core.zero_rad = home - offset
 
     def _offset_way(self) -> str:
-        """Return P12.11 of the M6-L: 0 at home, 1 shifts, 2 and 3 travel the offset
-        (000:2213-2222).
+        """Return P12.11 of the M6-L (000:2213-2222).
+
+        0: zero at home, 1: shift the position, 2 and 3: travel the offset.
         """
         traits = self._core.family.traits
         if traits.home_offset != "by_parameter":

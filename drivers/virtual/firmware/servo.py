@@ -283,9 +283,7 @@ class VirtualServo:
         return self._motion_object_changed
 
     def _listed_option(self, entry: Entry) -> Callable[[Raw], None]:
-        """Return a check that accepts only values listed in the manual (M6-L 000:3017, EP3E
-        001:885).
-        """
+        """Return a check for values listed in the manual (M6-L 000:3017, EP3E 001:885)."""
 
         def check(value: Raw) -> None:
             if int(value) not in entry.parameter.enum:
@@ -320,9 +318,7 @@ class VirtualServo:
         self.control.communication_lost()
 
     def network_started(self) -> None:
-        """Apply pending gear settings, in families where they act with the network (001:1002,
-        001:1036).
-        """
+        """Apply pending gear settings with the network (families: 001:1002, 001:1036)."""
         if not self._family.traits.acts_with_network or self.axis.powered:
             return
         self.od.activate("power_cycle")

@@ -66,8 +66,9 @@ class DsC(Cia402):
     TERMINALS = TERMINALS
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
-        """Return in-position window and time, out-of-tolerance threshold; home and limits on DI0 to
-        DI2.
+        """Return fallback values in addition to those of `Cia402`.
+
+        In-position window and time, out-of-tolerance threshold; home and limits on DI0 to DI2.
         """
         values = super().fallback_values(motor)
         turn = values["6065:00"]

@@ -198,8 +198,10 @@ class Mms7:
     def protections(
         self, od: ObjectDictionary, motor: MotorData, units: Units
     ) -> ProtectionSettings:
-        """Return protections; the enable bits (004:6177-6187) gate those they name, others always
-        act.
+        """Return the protections.
+
+        The enable bits (004:6177-6187) apply to the protections they name; others are always
+        active.
         """
         number, off = od.number, math.inf
         enabled = int(number("200B:01"))

@@ -237,8 +237,9 @@ class R6l(Cia402):
         )
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """Return times by P01.04, P01.05, P01.11 to P01.13 and an output with function 0
-        (002:8117-8273).
+        """Return the brake times (002:8117-8273); None if no output has function 0.
+
+        The times are in P01.04, P01.05 and P01.11 to P01.13.
         """
         if all(od.number(f"2002:{sub:02X}", -1) != 0 for sub in (0x21, 0x23, 0x25, 0x27)):
             return None
