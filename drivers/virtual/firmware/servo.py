@@ -318,7 +318,10 @@ class VirtualServo:
         self.control.communication_lost()
 
     def network_started(self) -> None:
-        """Apply pending gear settings with the network (families: 001:1002, 001:1036)."""
+        """Apply pending gear settings.
+
+        Only in families where they become active with the network (001:1002, 001:1036).
+        """
         if not self._family.traits.acts_with_network or self.axis.powered:
             return
         self.od.activate("power_cycle")
