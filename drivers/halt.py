@@ -46,7 +46,7 @@ class HaltCause(Enum):
 
 
 class LeftBy(Enum):
-    """What took the drive out of Operation enabled, according to its status word."""
+    """Cause of leaving Operation enabled, according to the status word."""
 
     FAULT = "fault"
     """The drive is in a fault or in its fault reaction."""

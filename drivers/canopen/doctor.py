@@ -94,7 +94,7 @@ class Examiner:
     def _settings(self) -> CanUrl:
         return self._port.url
 
-    # What is asked
+    # Requests
 
     def _ask(self, node: int, facts: dict[str, Any]) -> None:
         answers: dict[int, list[bytes]] = {}
@@ -190,7 +190,7 @@ class Examiner:
             return None
         return int.from_bytes(data, "little")
 
-    # What is heard
+    # Received frames
 
     def _listen(self, begin_s: float) -> None:
         """Wait for error frames and process data, which arrive without a request."""

@@ -45,7 +45,7 @@ class Port:
     carries_ip: bool = False
     card: Mapping[str, int] = field(default_factory=dict)
     interrupts: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
-    """By interrupt number: the cores that may handle it."""
+    """Cores that may handle an interrupt, by interrupt number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class HostFacts:
     busy: tuple[float, ...]
     stolen: float
     governors: Mapping[str, str]
-    """By the file that sets it."""
+    """Governors by the file that sets them."""
     idle_states: tuple[IdleState, ...]
     capabilities: frozenset[str]
     fifo_allowed: bool
@@ -76,7 +76,7 @@ class Computer:
     read_card: Callable[[str], Mapping[str, int]] = read_card
     wait: Callable[[], None] = lambda: time.sleep(_BUSY_SAMPLE_S)
     interface_flags: Callable[[str], int] = interface_flags
-    """For the network namespace of this process; /sys may show another one's interfaces."""
+    """Interface flags in the network namespace of this process; /sys may show another one's."""
 
     def facts(self, interface: str = "") -> HostFacts:
         """Read all facts. Takes about 0.3 s to measure the load of the cores."""

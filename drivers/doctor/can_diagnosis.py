@@ -77,8 +77,8 @@ def _of_the_bus(e: CanEvidence) -> Iterator[Sign]:
             yield "can_other_bit_rate", 8, Fact("protocol_errors", bus.protocol_errors, 0)
             yield "can_other_bit_rate", 0, Fact("bit_rate", bus.bitrate)
         elif bus.error_passive:
-            # From an adapter that reports no more than this: alone on the bus it stays error
-            # passive (ISO 11898-1 clause 8.2), with others at another bit rate it goes bus-off.
+            # The adapter reports nothing more. An adapter alone on the bus stays error passive (ISO
+            # 11898-1 clause 8.2); with others at another bit rate it goes bus-off.
             yield "can_no_acknowledge", 4, Fact("error_passive", bus.error_passive, 0)
             yield "can_other_bit_rate", 2, Fact("error_passive", bus.error_passive, 0)
         elif bus.not_sent:

@@ -203,7 +203,7 @@ def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _clock_then_contents(cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """For a drive that does not report the reason: the most frequent errors of files."""
+    """Yield the most frequent errors of files, for a drive that does not report the reason."""
     yield from _other_clock(cause, profile)
     yield from _own_contents(cause, profile)
 

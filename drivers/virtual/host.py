@@ -148,7 +148,7 @@ class Wires:
         self._can_wires[url] = (wire, side)
         self.real_urls[url] = f"canopen://slcan/{path}?bitrate={bitrate}"
 
-    # --- trouble ----------------------------------------------------------------------
+    # --- failures ---------------------------------------------------------------------
 
     def carry_out(self, command: dict[str, object]) -> object:
         """Execute one command of the control channel.

@@ -25,7 +25,7 @@ _KINDS: dict[str, SyncKind] = {
 _MEMORY, _MEMORY_END = 0x1000, 0x10000
 #: Size of the smallest CoE mailbox (ETG.1000.6), and the largest length of a sync manager.
 _SHORTEST_MAILBOX, _LONGEST = 16, 0x7FFF
-#: For a drive with a clock whose file has no operation mode: SYNC0 without SYNC1.
+#: Default for a drive with a clock whose file has no operation mode: SYNC0 without SYNC1.
 _SYNC0 = 0x0300
 
 

@@ -23,7 +23,7 @@ _SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 class _PlainDumper(_SafeDumper):  # type: ignore[misc, valid-type]
-    """For the data of a model: mostly texts and mappings, and no shared objects."""
+    """YAML dumper for model data: mostly texts and mappings, and no shared objects."""
 
     def represent_data(self, data: object) -> yaml.Node:
         if type(data) is str:

@@ -70,7 +70,7 @@ _UNITS = (
     "rev", "rpm/s", "r/s", "rps", "mr/s", "user unit", "units", "1/s", "0.1hz", "0.1rpm", "0.1ms",
     "0.01ms", "0.1a", "0.01a", "0.1v", "bit",
 )  # fmt: skip
-#: With or without a prefix: eight bare digits are a code, never a unit's name.
+#: Code of a unit, with or without a prefix: eight bare digits are never a unit's name.
 _UNIT_CODE = re.compile(r"(?:#x|0x)([0-9a-fA-F]{1,8})|([0-9a-fA-F]{8})")
 _PREFIXES = {0: "", 3: "k", 6: "M", -2: "c", -3: "m", -6: "µ", -9: "n"}
 #: Units that are not used with prefixes: 0.001 rev, not mrev.

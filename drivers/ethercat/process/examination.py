@@ -99,7 +99,7 @@ def _objects(station: Station, found: Message) -> Steps[None]:
             bits += sum(word & 0xFF for word in (yield from _list(station, pdo)) or ())
         found[name] = (bits + 7) // 8
     found["assigned"] = assigned
-    # From the EEPROM, by which a search identifies the drive; 1018h may belong to other firmware.
+    # Identity from the EEPROM, as used by a search; 1018h may belong to other firmware.
     for key, subindex, known in (
         ("vendor", 1, station.vendor_id),
         ("product", 2, station.product_code),

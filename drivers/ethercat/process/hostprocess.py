@@ -45,7 +45,7 @@ class HostProcess:
         *,
         raw_frames: bool = True,
     ) -> None:
-        """Without ``raw_frames`` the child inherits no descriptors, as on other systems."""
+        """Store the options. Without ``raw_frames`` the child inherits no descriptors."""
         self._options = tuple(options)
         self._raw_frames = raw_frames
         self._ring_file: Path | None = None

@@ -301,7 +301,7 @@ class Segment:
                     return reported
                 self.late_frames += 1
         except OSError:
-            # Nothing to read after all, a full queue, or the interface went down.
+            # Nothing to read, a full queue, or the interface went down.
             return None
         return None
 

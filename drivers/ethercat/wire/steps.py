@@ -39,7 +39,7 @@ class Pause(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Nothing is pending: more urgent transactions of the station may come in between here."""
+    """No transaction is pending: more urgent ones of the station may be inserted here."""
 
 
 Step = Read | Write | Pause | Gap

@@ -310,7 +310,7 @@ class VirtualServo:
         if self._watches_terminals and self.panel.update():
             self.control.faults.reset()
 
-    # --- trouble ---------------------------------------------------------------------------
+    # --- failures --------------------------------------------------------------------------
     def communication_lost(self, reason: str) -> None:  # noqa: ARG002 - the seam's signature
         """React when the wire's watchdog expired or the network state fell."""
         if isinstance(self.panel, Terminals):

@@ -101,7 +101,7 @@ class Controller:
         self._reaches.clear()
         self._has_dc = has_dc
 
-    # -- what the slave shows -------------------------------------------------------------------
+    # -- registers set by the slave -------------------------------------------------------------
 
     def show_state(self, status: int, code: int) -> None:
         """Set AL status and AL status code."""

@@ -152,7 +152,7 @@ class CoeDictionary:
         found = self._objects.get(0x1C12 if direction == "rx" else 0x1C13)
         return found.active() if found else ()
 
-    # -- what the CoE server asks ---------------------------------------------------------------
+    # -- access by the CoE server ----------------------------------------------------------------
 
     def indices(self) -> list[int]:
         """Return the indices of all objects, ascending."""

@@ -188,7 +188,7 @@ class Slave:
     def _show(self) -> None:
         self.controller.show_state(self.al.status, self.al.code)
 
-    # -- what the controller reports --------------------------------------------------------------
+    # -- events of the controller ---------------------------------------------------------------
 
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""
@@ -211,7 +211,7 @@ class Slave:
             self.al.fall(AlState.PREOP, code)
         self._show()
 
-    # -- what the state machine asks ------------------------------------------------------------
+    # -- calls of the state machine --------------------------------------------------------------
 
     def check(self, target: AlState) -> int:
         """Forbid states for which the master's configuration is invalid."""
