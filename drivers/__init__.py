@@ -1,1 +1,1 @@
-"""How to talk to a drive: links, wire formats and virtual drives on real wires."""
+"""Communication with a drive: links, wire formats, and virtual drives on real wires."""

@@ -1,17 +1,17 @@
-"""What the adapter of a bus URL may be: an allow-list of forms, and nothing else.
+"""Allow-list of the forms that the adapter in a bus URL may have.
 
-The place in a bus URL comes from the network, from a saved list of drives or from a file, and
-the libraries beneath understand far more than an adapter's name: pyserial opens URLs of its own
-(``spy:`` writes a file, ``socket:`` and ``rfc2217:`` connect to any computer, ``hwgrep:`` and
-``alt:`` search and load code), python-can takes ``NAME@BAUD``, and opening a device that is no
-serial port can have effects by itself (a watchdog begins to count). So only these pass:
+The adapter part of a bus URL comes from the network, from a saved list of drives or from a file,
+and the libraries below accept far more than adapter names: pyserial opens URLs of its own (``spy:``
+writes a file, ``socket:`` and ``rfc2217:`` connect to any computer, ``hwgrep:`` and ``alt:`` search
+and load code), python-can takes ``NAME@BAUD``, and merely opening a device that is not a serial
+port can have effects (a watchdog starts to count). Therefore only these forms are accepted:
 
 - a serial port: an absolute path that leads to a serial device, or ``COM1`` … ``COM999``;
-- a network interface by its name, or a network adapter of Windows by its ``NPF_{…}``;
-- a channel of one of python-can's interfaces, in the form that this interface has.
+- a network interface by its name, or a Windows network adapter by its ``NPF_{…}``;
+- a channel of one of python-can's interfaces, in the form that this interface uses.
 
-`require_serial_form` looks at the text alone, so that an address can be judged on any computer;
-`serial_device` follows links and is asked again each time that a port is opened.
+`require_serial_form` checks the text alone, so that an address can be checked on any computer;
+`serial_device` follows links and is called again each time a port is opened.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ from drivers.errors import LinkLost, OutOfRange
 from drivers.texts.message import text
 
 _COM = re.compile(r"(?:\\\\\.\\)?COM[1-9]\d{0,2}", re.IGNORECASE)
-#: Absolute, without control signs, and without the signs that the libraries give a meaning to.
+#: Absolute, without control characters, and without the characters that the libraries interpret.
 _PATH = re.compile(r"/[^\x00-\x1f\x7f-\x9f\ud800-\udfff\\?#]{1,250}")
 #: Serial lines, USB adapters, Bluetooth, the Mac's call-out ports, and pseudo-terminals. Consoles
-#: (/dev/tty, /dev/tty1) and everything else that can be opened are not among them.
+#: (/dev/tty, /dev/tty1) and all other devices are excluded.
 _DEVICE = re.compile(
     r"/dev/(?:tty[A-Za-z][\w.\-]{0,60}|(?:cu|tty)\.[\w.\-]{1,80}|rfcomm\d{1,3}|pts/\d{1,7})"
 )
-#: As the kernel names interfaces, without the signs that only a trap would use.
+#: Interface names as the kernel forms them, without unusual characters.
 _INTERFACE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.@:\-]{0,14}")
 
 SERIAL_LIMIT = text("limit.serial-device")
 
 
 def require_serial_form(place: str) -> None:
-    """The text is a device path or a COM port.
+    """Check that the text is a device path or a COM port.
 
     Raises:
         OutOfRange: it is anything else, such as a URL of pyserial.
@@ -58,14 +58,15 @@ def require_serial_form(place: str) -> None:
 
 
 def serial_device(place: str) -> str:
-    """The device that a serial port's name leads to, every link followed: what is to be opened.
+    """Return the device to open for the name of a serial port, with all links followed.
 
-    A link anywhere may lead to it, as those of udev and of virtual drives do; what is no serial
-    device is never opened, and outside ``/dev`` it is not said whether it exists.
+    A link anywhere may lead to it, as those of udev and of virtual drives do. A device that is not
+    a serial device is never opened, and for paths outside ``/dev`` the error does not reveal
+    whether they exist.
 
     Raises:
-        OutOfRange: not a serial port by its form.
-        LinkLost: no serial device, or the terminal that this server itself was started in.
+        OutOfRange: the form is not that of a serial port.
+        LinkLost: not a serial device, or the terminal in which this server was started.
     """
     require_serial_form(place)
     if not has_descriptor():
@@ -86,7 +87,7 @@ def serial_device(place: str) -> str:
 
 
 def ports_found() -> str:
-    """The serial ports that this computer has, to be shown."""
+    """Return the names of the serial ports of this computer for display, or "none"."""
     return ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
 
 
@@ -99,7 +100,7 @@ def _is_serial(device: str) -> bool:
 
 
 def require_interface(name: str) -> None:
-    """The text is the name of a network interface, 1 to 15 signs.
+    """Check that the text is the name of a network interface, 1 to 15 characters.
 
     Raises:
         OutOfRange: it is not.
@@ -113,9 +114,11 @@ def require_interface(name: str) -> None:
 
 
 def require_ethercat_adapter(name: str) -> None:
-    """The text is the name of a network interface, or ``NPF_{GUID}`` as Windows' adapters have it.
+    """Check that the text is the name of a network interface, or ``NPF_{GUID}`` of a Windows
+    adapter.
 
-    What is opened is taken from the system's own list; the form alone opens nothing.
+    The adapter opened is looked up in the system's own list; a name of the right form does not open
+    anything by itself.
 
     Raises:
         OutOfRange: it is neither.
@@ -125,7 +128,7 @@ def require_ethercat_adapter(name: str) -> None:
 
 
 def _require_multicast(channel: str) -> None:
-    """Any other address would send frames to a computer of the caller's choice."""
+    """Require a multicast address; any other could be a computer that the caller chooses."""
     try:
         address = ipaddress.ip_address(channel)
     except ValueError:
@@ -148,7 +151,7 @@ def _pattern(pattern: str, example: str) -> Callable[[str], None]:
     return require
 
 
-#: By python-can's name of the interface: the form of its channel.
+#: Form of the channel for each interface name of python-can.
 _CHANNELS: dict[str, Callable[[str], None]] = {
     "socketcan": require_interface,
     "slcan": require_serial_form,
@@ -162,7 +165,7 @@ CAN_INTERFACES = tuple(_CHANNELS)
 
 
 def require_channel(interface: str, channel: str) -> None:
-    """The text is a channel of this interface of python-can, one of `CAN_INTERFACES`.
+    """Check that the text is a channel of this interface of python-can, one of `CAN_INTERFACES`.
 
     Raises:
         OutOfRange: it is not.

@@ -1,6 +1,6 @@
-"""What each kind of bus brings: how its URLs are written, its traits, and its link.
+"""Description of each kind of bus: the form of its URLs, its traits, and its link.
 
-The folder of a bus has a module ``bus`` with a `BusKind` called ``BUS``; nothing else in the
+The folder of a bus has a module ``bus`` with a `BusKind` named ``BUS``; no other code in the
 product names a kind of bus. See ``CONTRIBUTING.md``, "Add a bus".
 """
 
@@ -25,11 +25,11 @@ class BusUrl:
 
     @property
     def is_virtual(self) -> bool:
-        """True for a wire that the demo makes, such as ``virtual0``."""
+        """True for a wire created by the demo, such as ``virtual0``."""
         return re.fullmatch(r"virtual\d+", self.place) is not None
 
     def with_options(self, **options: str | int) -> BusUrl:
-        """The same bus with some options replaced."""
+        """Return the same bus with some options replaced."""
         merged = dict(self.options) | {name: str(value) for name, value in options.items()}
         return replace(self, options=tuple(merged.items()))
 
@@ -40,19 +40,19 @@ class BusUrl:
 
 @dataclass(frozen=True, slots=True)
 class SerialLine:
-    """How the serial lines of a kind are usually set, the likeliest first."""
+    """Usual settings of the serial lines of a kind of bus, the most likely first."""
 
     baudrates: tuple[int, ...]
     parities: tuple[str, ...]
     standard_silence: bool = False
-    """The pause of the Modbus standard above 19200 baud, 1.75 ms; else 3.5 characters."""
+    """Use the pause of the Modbus standard above 19200 baud, 1.75 ms, instead of 3.5 characters."""
 
 
 @dataclass(frozen=True, slots=True)
 class BusKind:
-    """One kind of bus. ``link`` makes the link of a URL, not yet opened.
+    """One kind of bus. ``link`` creates the link of a URL without opening it.
 
-    ``require_place`` raises OutOfRange where an adapter is named in a form that is not allowed.
+    ``require_place`` raises OutOfRange if the form of the adapter name is not allowed.
     """
 
     example: str
@@ -63,5 +63,5 @@ class BusKind:
 
     @property
     def like(self) -> Text:
-        """How URLs of this kind are written."""
+        """Message with an example URL of this kind."""
         return text("link.write-it-like", example=self.example)

@@ -1,4 +1,4 @@
-"""The CiA 402 power state machine and its words, as pure functions.
+"""The CiA 402 power state machine, its control word and its status word, as pure functions.
 
 Sources: CiA 402-2 (IEC 61800-7-201) clauses 8.3–8.5; manual 003 lines 279–320 for the status
 word that echoes the control word.
@@ -11,7 +11,7 @@ from enum import Enum, IntEnum
 
 
 class State(Enum):
-    """Power states (CiA 402-2 table 28); the value is the name shown."""
+    """Power states (CiA 402-2 table 28); the value is the name displayed."""
 
     NOT_READY = "Not ready to switch on"
     SWITCH_ON_DISABLED = "Switch on disabled"
@@ -93,10 +93,10 @@ _STATES = (
 
 
 def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
-    """State shown by a status word.
+    """Return the power state that a status word reports.
 
-    ``echoes_control``: the family's bits 0–2 repeat the control word and bit 7 is the alarm
-    (manual 003:300-305).
+    ``echoes_control``: bits 0–2 of this family's status word repeat the control word, and bit 7 is
+    the alarm (manual 003:300-305).
     """
     if echoes_control:
         if status_word & 0x80:
@@ -114,7 +114,7 @@ def decode_state(status_word: int, *, echoes_control: bool = False) -> State:
 
 
 def fault_bit(*, echoes_control: bool = False) -> int:
-    """Bit of the status word that is set in the fault states and in no other (see `decode_state`).
+    """Return the status word bit that is set in the fault states only (see `decode_state`).
 
     CiA 402-2 table 29: bit 3; where the low bits repeat the control word, the alarm is bit 7.
     """
@@ -123,11 +123,11 @@ def fault_bit(*, echoes_control: bool = False) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """How a family takes commands with its process data, where CiA 402-2 has it otherwise.
+    """How a family accepts commands in its process data, where this differs from CiA 402-2.
 
-    ``echoes_control`` as in `decode_state`; ``quick_stop`` is the control word that stops it; at
-    least ``pause_s`` lies between two steps towards Operation enabled; ``speed_mode`` is the mode
-    that takes a speed with every cycle (Profile velocity where there is no CSV).
+    ``echoes_control`` as in `decode_state`; ``quick_stop`` is the control word of a quick stop; at
+    least ``pause_s`` [s] lies between two steps towards Operation enabled; ``speed_mode`` is the
+    mode that takes a velocity setpoint in every cycle (Profile velocity where there is no CSV).
     """
 
     echoes_control: bool = False
@@ -136,12 +136,12 @@ class Dialect:
     speed_mode: Mode = Mode.CSV
 
     def mode(self, mode: int) -> int:
-        """The mode that does the work of ``mode`` on this drive."""
+        """Return the mode that this drive uses in place of ``mode``."""
         return int(self.speed_mode) if mode == Mode.CSV else mode
 
 
 def stops(control_word: int) -> bool:
-    """Whether this word only takes motion away: quick stop, disable voltage or halt.
+    """Return whether this control word can only stop motion: quick stop, disable voltage or halt.
 
     Source: CiA 402-2 table 29 (commands); bit 8 is halt, bit 7 resets a fault.
     """
@@ -151,16 +151,17 @@ def stops(control_word: int) -> bool:
 
 
 def is_stop(index: int | None, subindex: int, data: bytes) -> bool:
-    """Whether writing this (little endian) is a control word that only takes motion away."""
+    """Return whether writing this (little endian) is a control word that can only stop motion."""
     return (index, subindex) == (0x6040, 0) and stops(int.from_bytes(data, "little"))
 
 
 def next_control_word(state: State, goal: State, previous: int = 0) -> int | None:
-    """Control word of the next step from ``state`` towards ``goal``, or None when arrived.
+    """Return the control word of the next step from ``state`` to ``goal``; None if none is due.
 
-    Goals: SWITCH_ON_DISABLED, READY, SWITCHED_ON, OPERATION_ENABLED, QUICK_STOP_ACTIVE. A fault
-    is left only through the rising edge of bit 7 (transition 15), which ``previous`` serves to
-    make: a word that already has the bit set is first answered by one without.
+    Goals: SWITCH_ON_DISABLED, READY, SWITCHED_ON, OPERATION_ENABLED, QUICK_STOP_ACTIVE. None is
+    returned in ``goal`` itself and in the states that the drive leaves by itself. A fault is left
+    only by a rising edge of bit 7 (transition 15): if ``previous``, the word sent last, already has
+    the bit set, the result is a word without it.
     """
     if state is goal:
         return None
@@ -182,7 +183,7 @@ def next_control_word(state: State, goal: State, previous: int = 0) -> int | Non
 
 
 def allowed_goals(state: State) -> tuple[State, ...]:
-    """Goals that a user may choose in ``state``, in the order of the state picture."""
+    """Return the goals that a user may choose in ``state``, in the order of the state diagram."""
     ordinary = (
         State.SWITCH_ON_DISABLED,
         State.READY,

@@ -1,4 +1,4 @@
-"""Bytes to values and back: pure functions, little endian (CiA 301 clause 7.1.4)."""
+"""Conversion between bytes and raw values: pure, little endian (CiA 301 clause 7.1.4)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _FORMAT: dict[str, str] = {
 
 
 def size_of(data_type: DataType) -> int | None:
-    """Length in bytes, or None for text and octets, whose length the drive decides."""
+    """Return the length in bytes, or None for text and octets, whose length the drive decides."""
     form = _FORMAT.get(data_type)
     return struct.calcsize(form) if form else None
 
@@ -25,10 +25,10 @@ _LARGEST = 3.4028234663852886e38
 
 
 def encode(data_type: DataType, raw: Raw) -> bytes:
-    """Raw value to bytes.
+    """Convert a raw value to bytes.
 
     Raises:
-        OutOfRange: not a number of this type, or outside it.
+        OutOfRange: not a number of this type, or outside its range.
     """
     if data_type == "OCTETS":
         return _octets(raw)
@@ -36,7 +36,7 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
         return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
     if isinstance(raw, str) or (isinstance(raw, bool) and data_type != "BOOL"):
         raise OutOfRange("link.not-number", value=raw, data_type=data_type)
-    if not abs(raw) <= _LARGEST:  # not so for nan either
+    if not abs(raw) <= _LARGEST:  # also true for NaN
         raise OutOfRange("link.no-number", value=raw, data_type=data_type)
     if data_type == "REAL32":
         return struct.pack("<f", float(raw))
@@ -56,7 +56,7 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
 
 
 def _octets(raw: Raw) -> bytes:
-    """The bytes that `decode` shows as "0a ff"; anything else would be written as letters."""
+    """Convert the notation of `decode`, "0a ff", to bytes instead of sending it as text."""
     try:
         return bytes.fromhex(raw) if isinstance(raw, str) else bytes([int(raw)])
     except (ValueError, OverflowError) as error:
@@ -68,17 +68,18 @@ def _octets(raw: Raw) -> bytes:
 
 
 def text_of(data: bytes) -> str:
-    """A drive's text, which ends with its bytes or with a zero byte before."""
+    """Decode a drive's text, which ends at the first zero byte or with the data."""
     text = data.split(b"\0", 1)[0]
     try:
         return text.decode("utf-8").strip()
     except UnicodeDecodeError:
-        # CiA 301 knows only ASCII; makers write their own code page. No letter must be lost.
+        # CiA 301 allows only ASCII, but manufacturers use their own code pages. Latin-1 keeps every
+        # byte.
         return text.decode("latin-1").strip()
 
 
 def decode(data_type: DataType, data: bytes) -> Raw:
-    """Bytes to raw value.
+    """Convert bytes to a raw value.
 
     Raises:
         ProtocolError: the length does not fit the type.

@@ -1,4 +1,4 @@
-"""How a family speaks CiA 402, read from its profile."""
+"""The CiA 402 dialect of a family, read from its profile."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from profiles.schema import Profile
 
 
 def dialect_of(profile: Profile) -> Dialect:
-    """What the family's oddities mean for its power states."""
+    """Return the dialect that results from the quirks in the family's profile."""
     pause, stop = profile.quirk("enable_pause"), profile.quirk("quick_stop_word")
     return Dialect(
         echoes_control=profile.quirk("own_status_word") is not None,

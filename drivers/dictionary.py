@@ -1,4 +1,4 @@
-"""What a drive's own dictionary reports of its objects."""
+"""Descriptions of objects as the drive's own object dictionary reports them."""
 
 from __future__ import annotations
 

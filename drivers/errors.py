@@ -1,21 +1,21 @@
-"""The one error tree of servodeck.
+"""The single error hierarchy of servodeck.
 
 ::
 
     DriveError
     ├── LinkTimeout      no answer in time; the outcome of a write is unknown
-    │   └── NotAsked     not sent at all: the drive had left what came before unanswered
-    ├── LinkLost         the wire or adapter is gone; nothing reaches the drive
+    │   └── NotAsked     not sent: the drive has not answered since an earlier time-out
+    ├── LinkLost         the wire or adapter is gone; the drive cannot be reached
     ├── ProtocolError    an answer came that the protocol does not allow
     ├── Rejected         the drive understood and refused (abort or exception code)
     ├── OutOfRange       the value does not fit the parameter; nothing was sent
     ├── NotAllowed       access, state or permission forbids it; nothing was sent
-    │   ├── NotInUse     the drive's own count leaves this entry out
+    │   ├── NotInUse     the entry lies beyond the count that the drive reports
     │   └── MotionHalted the cyclic loop ended the motion by force; ``halt`` states why
     │       └── EnvelopeExceeded  a limit of the envelope was passed
     └── Busy             somebody or something else holds the axis or the bus
 
-Third-party exceptions are translated to these once, at the driver's edge.
+Each driver translates third-party exceptions to these once, where it calls the library.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from drivers.texts.message import Param, Text, as_text, joined, prose, reason_of
 class DriveError(Exception):
     """Base of all errors about drives.
 
-    ``text`` is what happened: a code of the catalogue with its facts, without words. ``drive``,
-    ``parameter``, ``value`` and ``limit`` are facts of it that a user needs in any language; what
-    to do next is `advice_text`. `message`, `remedy` and `advice` are these in English.
+    ``text`` states what happened: a catalogue code with its parameters, without words. ``drive``,
+    ``parameter``, ``value`` and ``limit`` are facts that a user needs in any language;
+    `advice_text` states what to do next. `message`, `remedy` and `advice` are these in English.
     """
 
     kind = "drive-error"
-    #: What helps against this kind of error where nothing nearer is known: a code.
+    #: Code of the usual remedy for this kind of error where no more specific one is known.
     usual_remedy: str | None = None
 
     def __init__(
@@ -57,19 +57,19 @@ class DriveError(Exception):
         self.drive = drive
         self.parameter = parameter
         self.value = value
-        #: What the value may be: a message, or figures, names and forms, which have no words.
+        #: Allowed values: a message, or figures, names and forms, which are not translated.
         self.limit_text = prose(limit) if isinstance(limit, str) else limit
-        #: What to do about it, where that is not what the catalogue says to the code.
+        #: What to do about it, where this differs from the catalogue's remedy for the code.
         self.own_remedy = as_text(remedy, self.text.params) if remedy else None
 
     @property
     def code(self) -> str:
-        """What happened, as a code of the catalogue; empty for words that others made."""
+        """Catalogue code of what happened; empty for text from third parties."""
         return self.text.code
 
     @property
     def limit(self) -> str | None:
-        """What the value may be, in English."""
+        """The allowed values, in English."""
         return None if self.limit_text is None else self.limit_text.words()
 
     @property
@@ -79,7 +79,7 @@ class DriveError(Exception):
 
     @property
     def remedy_text(self) -> Text | None:
-        """What to do about it; None where nothing is known for this error alone."""
+        """What to do about it; None if no remedy is known for this particular error."""
         return self.own_remedy or self.text.remedy()
 
     @property
@@ -90,7 +90,7 @@ class DriveError(Exception):
 
     @property
     def advice_text(self) -> Text | None:
-        """What to do next: the nearest remedy that is known."""
+        """What to do next: the most specific remedy known."""
         if (known := self.remedy_text) is not None:
             return known
         usual = self.usual_remedy or ("error.within-limit" if self.limit_text else None)
@@ -103,7 +103,7 @@ class DriveError(Exception):
         return None if known is None else known.words()
 
     def at(self, drive: str | None = None, parameter: str | None = None) -> DriveError:
-        """The same error with the drive or parameter filled in where it was not known below."""
+        """Fill in the drive or parameter if not set by a lower layer; return the error."""
         self.drive = self.drive or drive
         self.parameter = self.parameter or parameter
         return self
@@ -113,23 +113,23 @@ class DriveError(Exception):
 
 
 def internal_error(error: Exception) -> Text:
-    """What says that an error is ours, with what Python calls it."""
+    """Return the message for an error in servodeck itself, with Python's name and text of it."""
     return text("error.internal", kind=type(error).__name__, detail=str(error))
 
 
 def why_of(error: Exception) -> Text:
-    """What an error says, as a message: of ours its code, of others the words they made."""
+    """Return an error as a message: its code for our own, its original text for any other."""
     return error.text if isinstance(error, DriveError) else reason_of(error)
 
 
 def with_remedy(error: DriveError) -> Text:
-    """What happened, and what helps against it."""
+    """Return what happened together with its remedy, if one is known."""
     remedy = error.remedy_text
     return error.text if remedy is None else joined((error.text, remedy))
 
 
 def _fact(value: object) -> Param:
-    """A value as a fact of a message."""
+    """Convert a value to a parameter of a message."""
     if value is None or isinstance(value, (str, int, float, Enum, Text)):
         return value
     return str(value)
@@ -143,7 +143,7 @@ class LinkTimeout(DriveError):
 
 
 class NotAsked(LinkTimeout):
-    """Nothing was asked, as the drive has not answered since an earlier time-out."""
+    """The request was not sent, as the drive has not answered since an earlier time-out."""
 
 
 class LinkLost(DriveError):
@@ -154,7 +154,7 @@ class LinkLost(DriveError):
 
 
 class ProtocolError(DriveError):
-    """An answer that the protocol does not allow: bad CRC, wrong length, wrong toggle bit."""
+    """An answer that the protocol does not allow: wrong CRC, length or toggle bit."""
 
     kind = "protocol-error"
     usual_remedy = "error.protocol-error"
@@ -190,7 +190,7 @@ class Rejected(DriveError):
 
 
 class OutOfRange(DriveError):
-    """The value cannot be a value of this parameter."""
+    """The value is not valid for this parameter."""
 
     kind = "out-of-range"
 
@@ -198,7 +198,7 @@ class OutOfRange(DriveError):
 class NotAllowed(DriveError):
     """Read-only, wrong state, missing permission or unmet precondition.
 
-    ``names_faults``: the message already names the faults that the drive has.
+    ``names_faults``: the message already lists the active faults of the drive.
     """
 
     kind = "not-allowed"
@@ -206,13 +206,13 @@ class NotAllowed(DriveError):
 
 
 class NotInUse(NotAllowed):
-    """An entry of a list beyond the count that the drive reports: there is nothing to be read."""
+    """An entry of a list beyond the count that the drive reports; it holds nothing to read."""
 
     kind = "not-in-use"
 
 
 class MotionHalted(NotAllowed):
-    """The cyclic loop ended a motion by force. ``halt`` is the cause, to decide by."""
+    """The cyclic loop ended a motion by force. Code that decides by the cause reads ``halt``."""
 
     def __init__(
         self,
@@ -240,9 +240,9 @@ def motion_halted(
     drive: str | None = None,
     remedy: str | Text | None = None,
 ) -> MotionHalted:
-    """The error for a halt of ``where``, a station or a drive by name.
+    """Create the error for a halt of ``where``, the name of a station or a drive.
 
-    ``words`` are those in the units of the axis, where they are known.
+    ``words`` states the cause in the units of the axis, where these are known.
     """
     kind = EnvelopeExceeded if halt.cause in ENVELOPE_CAUSES else MotionHalted
     return kind(
@@ -256,11 +256,11 @@ def motion_halted(
 
 
 def exceeded(error: DriveError) -> HaltCause | None:
-    """The limit of the envelope that ended a motion with this error; None for any other error."""
+    """Return the envelope limit that ended a motion with this error; None for any other error."""
     return error.halt.cause if isinstance(error, EnvelopeExceeded) else None
 
 
 class Busy(DriveError):
-    """Held by another job, person or transaction."""
+    """The axis or bus is held by another job, person or transaction."""
 
     kind = "busy"

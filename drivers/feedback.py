@@ -1,8 +1,9 @@
-"""Whether 606Ch and the differences of 6064h report the same motion.
+"""Check that 606Ch and the differences of 6064h report the same motion.
 
-Both are compared over windows of time, so that a 606Ch that lags, is a mean over some cycles or is
-coarsely rounded agrees, while one in another unit, of another sign, or that stands still does not.
-Pure: `FeedbackWatch.take` gets samples with their times and never raises.
+Both are compared over time windows. A 606Ch that lags, is averaged over some cycles or is coarsely
+rounded therefore agrees; one in another unit, with the opposite sign, or constant does not.
+
+Pure: `FeedbackWatch.take` receives samples with their times and never raises.
 """
 
 from __future__ import annotations
@@ -13,31 +14,31 @@ from enum import StrEnum
 from itertools import pairwise
 
 _PARTS = 5
-"""Parts of a window; each is closed with its own sums, and the window slides by one part."""
+"""Parts of a window; each has its own sums, and the window slides by one part."""
 _RELATIVE = 0.25
-"""Share of the greater speed that the two may differ by."""
+"""Allowed difference, as a share of the greater of the two speeds."""
 _LAG = 0.25
-"""Share of a window that 606Ch may lag: 10 ms of 40 ms."""
+"""Share of a window by which 606Ch may lag: 10 ms of 40 ms."""
 _COUNTS = 2.0
-"""Increments that a difference of positions may be wrong by."""
+"""Possible error of a difference of positions, in increments."""
 _MOST_IGNORED = 3.0
-"""Rounding of 606Ch that is found while it runs may widen what is ignored by this factor."""
+"""Rounding of 606Ch detected during the motion may widen ``ignored`` by at most this factor."""
 _VOTES = 2 * _PARTS
-"""Windows in a row, each a part later, that must disagree."""
+"""Number of consecutive windows, each one part later, that must disagree."""
 _APART = 3.0
-"""Factor between the two beyond which a speed limit was met by a wrong value, not by a speed."""
+"""Factor between the two above which a wrong value, not a real speed, exceeded a limit."""
 _INSTANT = 4
-"""Samples over which a speed beyond its limit is compared with the position, there and then."""
+"""Number of newest samples over which a speed beyond its limit is compared with the position."""
 _WRAP = 2**32
 
 WINDOW_S = 0.04
-"""Of a cyclic exchange. Polled signals need longer ones."""
+"""Window of a cyclic exchange [s]. Polled signals need longer windows."""
 LIMIT_MARGIN = 1.15
-"""A speed by position is a mean over cycles that are not quite equally long."""
+"""Tolerance for a speed by position, which is averaged over cycles of unequal length."""
 
 
 class Disagreement(StrEnum):
-    """How 606Ch and the position disagree."""
+    """Kind of disagreement between 606Ch and the position."""
 
     SCALE = "scale"
     SIGN = "sign"
@@ -47,10 +48,10 @@ class Disagreement(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FeedbackScale:
-    """How the two hang together.
+    """Relation between 606Ch and 6064h.
 
     ``velocity_per_inc_s`` is raw 606Ch per increment per second of 6064h; differences below
-    ``ignored`` [raw 606Ch] are none.
+    ``ignored`` [raw 606Ch] do not count.
     """
 
     velocity_per_inc_s: float
@@ -59,7 +60,7 @@ class FeedbackScale:
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """What each shows, in raw units of 606Ch: ``reported`` by 606Ch, ``seen`` by the position."""
+    """Speed by 606Ch (``reported``) and by the position (``seen``), both in raw units of 606Ch."""
 
     kind: Disagreement
     reported: float
@@ -75,7 +76,7 @@ class _Part:
 
 
 class FeedbackWatch:
-    """One motion of one axis. ``window_s`` is the length over which the two are compared."""
+    """Watches one motion of one axis. ``window_s`` [s] is the length of the comparison window."""
 
     def __init__(self, scale: FeedbackScale, window_s: float = WINDOW_S) -> None:
         self._scale = scale
@@ -88,10 +89,10 @@ class FeedbackWatch:
         self._undated = 0
         self._votes = 0
         self._finest = 0.0
-        """Smallest step of 606Ch: its rounding cannot be coarser."""
+        """Smallest step of 606Ch seen: an upper limit of its rounding."""
 
     def take(self, position: int, velocity: float, at_s: float) -> Contradiction | None:
-        """One sample: raw 6064h and 606Ch at a time [s]; what contradicts, once it is certain."""
+        """Add a sample of raw 6064h and 606Ch at a time [s]; return a contradiction when sure."""
         if self._undated:
             self._undated -= 1
             return None
@@ -116,23 +117,23 @@ class FeedbackWatch:
         return self._judge() if len(self._parts) == _PARTS else None
 
     def gap(self) -> None:
-        """Cycles were skipped: what lies across them is not compared, what came before stays.
+        """Note that cycles were skipped: nothing is compared across them; earlier parts are kept.
 
-        Nor is the first sample after them: some drives latch it at the last frame before the gap,
-        others just before it is fetched, so its time is not certain.
+        The first sample after the gap is not used either: some drives latch it at the last frame
+        before the gap, others just before it is fetched, so its time is not certain.
         """
         self._last, self._undated = None, 1
         self._newest.clear()
 
     def interrupt(self) -> None:
-        """The position was set again (homing), or samples are missing: begin a new window."""
+        """Begin a new window: the position was set anew (homing), or samples are missing."""
         self._parts.clear()
         self._newest.clear()
         self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None
         self._undated = 0
 
     def too_fast(self, limit: float) -> float | None:
-        """The speed by position [raw 606Ch] where it is certainly beyond this limit."""
+        """Return the speed by position [raw 606Ch] if it certainly exceeds the limit, or None."""
         if len(self._parts) < 2:
             return None
         recent = list(self._parts)[-2:]
@@ -142,7 +143,7 @@ class FeedbackWatch:
         return moved / time_s * self._scale.velocity_per_inc_s if least > limit else None
 
     def denied(self) -> Contradiction | None:
-        """Whether the position denies the speed that 606Ch has shown over the newest samples."""
+        """Return the contradiction if the newest positions do not confirm the speed by 606Ch."""
         newest = list(self._newest)
         if len(newest) < 2:
             return None
@@ -159,7 +160,7 @@ class FeedbackWatch:
         return self._of(reported, moved, time_s) if self._apart(most, abs(reported)) else None
 
     def unnoticed(self, seen: float) -> Contradiction | None:
-        """Whether 606Ch denies this speed of the position: it reported none like it lately."""
+        """Return the contradiction if 606Ch recently reported no speed near ``seen``."""
         recent = self._recent()
         if not self._apart(max(part.peak_reported for part in recent), abs(seen)):
             return None
@@ -205,12 +206,12 @@ class FeedbackWatch:
 
 
 def _difference(new: int, old: int) -> int:
-    """Of two positions of 32 bits, over their end too."""
+    """Difference of two 32-bit positions, including across their overflow."""
     return (new - old + _WRAP // 2) % _WRAP - _WRAP // 2
 
 
 def disagreement(reported: float, seen: float) -> Disagreement:
-    """How a speed by 606Ch and one by the position disagree, both in raw units of 606Ch."""
+    """Classify how a speed by 606Ch and one by position disagree, both in raw units of 606Ch."""
     if abs(reported) < 1.0:
         return Disagreement.SPEED_STANDS
     if seen == 0.0:

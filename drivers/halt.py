@@ -1,6 +1,6 @@
-"""Why a cyclic loop ended a motion by force: a value from the loop up to the error of a tool.
+"""Why a cyclic loop ended a motion by force: a value passed from the loop to a tool's error.
 
-`Halted.text` is its message for people. Nothing decides by them: what may be tried
+`Halted.text` is its message for people. No code decides by the message: what may be tried
 after a halt depends on `Halted.cause` alone.
 """
 
@@ -17,7 +17,7 @@ Quantity = Literal["position", "speed", "torque", "following error", "skew"]
 
 
 class HaltCause(Enum):
-    """What ended the motion."""
+    """Cause that ended the motion."""
 
     POSITION = "position"
     """The position left the envelope."""
@@ -28,7 +28,7 @@ class HaltCause(Enum):
     FOLLOWING = "following"
     """The following error was above the envelope's limit."""
     SKEW = "skew"
-    """Two axes of one machine went apart by more than the envelope's limit."""
+    """The positions of two axes of one machine differed by more than the envelope's limit."""
     PARTNER = "partner"
     """The other axis of the same machine was stopped."""
     EXPIRED = "expired"
@@ -36,9 +36,9 @@ class HaltCause(Enum):
     LEFT_ENABLED = "left_enabled"
     """The drive left Operation enabled by itself: a fault, an emergency stop, STO, supply."""
     COMMANDED = "commanded"
-    """Somebody or something in servodeck commanded the end: STOP, release, end of the exchange."""
+    """The end was commanded within servodeck: STOP, release, or end of the exchange."""
     LOST = "lost"
-    """The process data, the node, the bus or the server's signs of life did not come any more."""
+    """The process data, the node, the bus or the server's keep-alive was lost."""
     UNFIT = "unfit"
     """A setpoint does not fit its object, so it could not be sent."""
     CONTRADICTION = "contradiction"
@@ -46,19 +46,19 @@ class HaltCause(Enum):
 
 
 class LeftBy(Enum):
-    """What took the drive out of Operation enabled, by its status word."""
+    """Cause of leaving Operation enabled, according to the status word."""
 
     FAULT = "fault"
-    """It has a fault, or reacts to one."""
+    """The drive is in a fault or in its fault reaction."""
     QUICK_STOP = "quick_stop"
     """A quick stop that the loop did not command: a terminal, another master, the drive itself."""
     VOLTAGE = "voltage"
     """Bit 4 is 0: main power or STO is gone (CiA 402-2 table 30)."""
     OTHERS = "others"
-    """None of these: another master, a terminal or the drive's panel took the power away."""
+    """None of these: another master, a terminal or the drive's panel disabled the drive."""
 
 
-#: Causes that are a limit of the envelope.
+#: Causes that are limits of the envelope.
 ENVELOPE_CAUSES = frozenset(
     {
         HaltCause.POSITION,
@@ -81,10 +81,11 @@ _CAUSE_OF: Mapping[Quantity, HaltCause] = {
 class Halted:
     """The end of a motion by force.
 
-    ``quantity`` is what was watched, ``value`` and ``limit`` are in raw drive units; all three are
-    None where the cause is no limit. Of a contradiction, ``value`` is what 606Ch says and ``limit``
-    what the position says, both in raw units of 606Ch. ``left_by`` is known of a drive that left
-    Operation enabled under the loop. ``note`` holds what else is known, for people only.
+    ``quantity`` is the monitored quantity; ``value`` and ``limit`` are in raw drive units; all
+    three are None where the cause is not a limit. For a contradiction, ``value`` is the speed by
+    606Ch and ``limit`` the speed by position, both in raw units of 606Ch. ``left_by`` is set if the
+    drive left Operation enabled while the loop ran. ``note`` holds further details, for people
+    only.
     """
 
     cause: HaltCause
@@ -96,12 +97,12 @@ class Halted:
 
     @classmethod
     def beyond(cls, quantity: Quantity, value: float, limit: float) -> Halted:
-        """A limit of the envelope was passed."""
+        """Create the halt for a limit of the envelope that was passed."""
         return cls(_CAUSE_OF[quantity], quantity, value, limit)
 
     @property
     def text(self) -> Text:
-        """For people: the page, the log and messages."""
+        """Message for people: the page, the log and error messages."""
         note = as_text(self.note)
         if self.cause in ENVELOPE_CAUSES and self.value is not None and self.limit is not None:
             return text(
@@ -129,7 +130,7 @@ class Halted:
         return self.text.words()
 
     def to_wire(self) -> dict[str, Any]:
-        """As a map of plain values, for a message to another process."""
+        """Return a map of plain values, for a message to another process."""
         return {
             "cause": self.cause.value,
             "quantity": self.quantity,
@@ -141,10 +142,10 @@ class Halted:
 
     @classmethod
     def from_wire(cls, wire: Mapping[str, Any]) -> Halted:
-        """The same value again.
+        """Restore the value from a map made by `to_wire`.
 
         Raises:
-            ValueError, KeyError: the map is none that `to_wire` made.
+            ValueError, KeyError: the map was not made by `to_wire`.
         """
         note, left_by = wire["note"], wire["left_by"]
         return cls(
@@ -171,16 +172,16 @@ _TEXTS: Mapping[HaltCause, str] = {
 
 
 def quantity_key(quantity: Quantity | None) -> str:
-    """The name of a quantity as the catalogue selects by it."""
+    """Return the name of a quantity as the catalogue uses it to select a text."""
     return (quantity or "").replace(" ", "-")
 
 
 class LoopState(NamedTuple):
-    """What a loop knows of one axis."""
+    """State of one axis as the cyclic loop reports it."""
 
     state: str
     """CiA 402 power state, a value of `drivers.cia402.State`."""
     phase: str
-    """What the setpoints do, a value of `drivers.motion.setpoint_plan.Phase`."""
+    """State of the setpoints, a value of `drivers.motion.setpoint_plan.Phase`."""
     halted: Halted | None
-    """Why the last motion was ended by force; None while none was."""
+    """Why the last motion was ended by force; None if it was not."""

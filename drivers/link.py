@@ -1,9 +1,9 @@
-"""The seam between drives and buses.
+"""The interface between drives and buses.
 
-A `Link` is one opened bus. It moves bytes and interprets neither units nor meaning. Values travel
-in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial link
-converts to and from its registers. Links are asynchronous outside; each runs its blocking code
-on one thread of its own, so that there is one transaction at a time per bus.
+A `Link` is one opened bus. It transfers bytes and interprets neither units nor meaning. Values
+travel in CANopen byte order (little endian, CiA 301 clause 7.1.4) on every kind of link; a serial
+link converts to and from its registers. The methods of a link are asynchronous; each link runs its
+blocking code on a thread of its own, so that there is one transaction at a time per bus.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from profiles.schema import DataType, LinkKind, Profile
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where a value lives. ``index`` is None for what only a Modbus register reaches."""
+    """Address of a value. ``index`` is None for values that only a Modbus register can reach."""
 
     index: int | None
     subindex: int
@@ -42,7 +42,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One drive seen by a scan. Fields are None where the link cannot show."""
+    """One drive found by a scan. Fields are None where the link cannot read them."""
 
     station: int
     vendor_id: int | None = None
@@ -56,17 +56,17 @@ class Found:
     state: Text | None = None
     notes: tuple[Text, ...] = ()
     device_profile: int | None = None
-    """Low word of 1000h (CiA 301 clause 7.5.2.1): 402 for drives, 0 for none of the standard."""
+    """Low word of 1000h (CiA 301 clause 7.5.2.1): 402 for drives, 0 for no standard profile."""
 
     @property
     def is_other_device(self) -> bool:
-        """It states a device profile, and not that of drives: a terminal, say."""
+        """True if the station reports a device profile other than that of drives, such as I/O."""
         return self.device_profile not in (None, 0, 402)
 
 
 @dataclass(frozen=True, slots=True)
 class LinkQuality:
-    """Counters since opening. ``details`` holds kind-specific figures with units in the name."""
+    """Counters since opening. ``details`` holds kind-specific figures with units in the names."""
 
     connected: bool
     transactions: int = 0
@@ -86,7 +86,7 @@ EventKind = Literal["emergency", "boot", "lost", "back", "state", "overload", "f
 
 @dataclass(frozen=True, slots=True)
 class LinkEvent:
-    """What a bus reports by itself. ``code`` is the error code of an emergency."""
+    """An event that a bus reports unprompted. ``code`` is the error code of an emergency."""
 
     kind: EventKind
     station: int | None
@@ -95,7 +95,7 @@ class LinkEvent:
 
 
 Progress = Callable[[float, Text], None]
-"""Called with a fraction 0…1 and what is being done. Must not block."""
+"""Called with a fraction 0…1 and a message about the current step. Must not block."""
 
 Unsubscribe = Callable[[], None]
 
@@ -105,28 +105,28 @@ _CHECK_WHEN_SILENT = text("link.check-when-silent")
 
 @dataclass(frozen=True, slots=True)
 class LinkTraits:
-    """What a kind of bus is like: callers ask for a trait, never for a kind."""
+    """Properties of a kind of bus: callers query a trait, never the kind."""
 
     batch: int = 16
-    """Values for one `Link.read_many`. Small, so that a STOP never waits behind a long batch; a
-    link that lets a write go between two of its requests takes more.
+    """Number of values for one `Link.read_many`. Small, so that a STOP never waits behind a long
+    batch; a link that lets a write pass between two of its requests has a greater number.
     """
     whole_objects: bool = False
-    """Entries of an object are read together: an object is not parted between two batches."""
+    """Entries of one object are read together: an object is not split between two batches."""
     registers: bool = False
-    """Values are reached by their Modbus register, not by index and subindex."""
+    """Values are addressed by their Modbus register, not by index and subindex."""
     synchronous: bool = False
-    """Setpoints and samples share one instant of every cycle without clocks in the drives."""
+    """Setpoints and samples share one instant in every cycle without clocks in the drives."""
     description: Literal["none", "dictionary", "stored_eds"] = "none"
-    """How a drive reports its own objects: not, by `Link.enumerate`, or by an EDS in 1021h."""
+    """How a drive describes its objects: not at all, by `Link.enumerate`, or by an EDS in 1021h."""
     fills_network: bool = False
-    """Its frames fill the network of the port that they are sent on."""
+    """Its frames occupy the network of the port that sends them."""
     silent: Text = _CHECK_WHEN_SILENT
-    """What to look at where nothing answers."""
+    """What to check if no station answers."""
 
 
 def lists_nothing(kind: LinkKind, station: int) -> NotAllowed:
-    """What `Link.enumerate` raises on a bus whose drives do not list their objects."""
+    """Create the error of `Link.enumerate` for a bus whose drives do not list their objects."""
     return NotAllowed("link.drive-cannot-list-objects", drive=f"station {station}", kind=kind)
 
 
@@ -134,7 +134,7 @@ class RecordsFrames(Protocol):
     """A link that keeps the last minute of its frames."""
 
     async def flight(self, station: int | None = None) -> bytes:
-        """The frames as a pcapng file; of one station only what has to do with it.
+        """Return the frames as a pcapng file; with a station, only those that concern it.
 
         Raises:
             LinkLost: nothing is being recorded.
@@ -144,7 +144,7 @@ class RecordsFrames(Protocol):
 class Link(Protocol):
     """One opened bus. See the module docstring for byte order and threading.
 
-    `cyclic`, `doctor` and `frames` are parts that a bus may lack, and are None then.
+    `cyclic`, `doctor` and `frames` are optional parts; each is None on a bus without it.
     """
 
     kind: LinkKind
@@ -153,15 +153,15 @@ class Link(Protocol):
 
     @property
     def cyclic(self) -> Cyclic | None:
-        """Synchronous process data, where the bus has them."""
+        """Cyclic process data, where the bus has them."""
 
     @property
     def doctor(self) -> Examines | None:
-        """What states why a station is not in Operational."""
+        """The part that determines why a station is not in Operational."""
 
     @property
     def frames(self) -> RecordsFrames | None:
-        """The last minute of its frames."""
+        """The recorder of the last minute of frames."""
 
     async def open(self) -> None:
         """Open the adapter.
@@ -171,13 +171,13 @@ class Link(Protocol):
         """
 
     async def close(self) -> None:
-        """Close it. Calling again does nothing."""
+        """Close the link. Further calls have no effect."""
 
     def attach(self, station: int, profile: Profile) -> None:
-        """Say which family answers at ``station``: word order, block limits, process data."""
+        """Set the family of the drive at ``station``: word order, block limits, process data."""
 
     def unreachable(self, station: int, address: Address) -> Text | None:
-        """Why the link cannot carry this value of the attached family; None where it can."""
+        """Return why the link cannot transfer this value of the attached family; None if it can."""
 
     async def scan(
         self,
@@ -188,43 +188,44 @@ class Link(Protocol):
     ) -> list[Found]:
         """Look for drives; cancel by cancelling the task.
 
-        ``stop_after`` so many drives a bus stops that asks one address after the other, each at
-        the price of a time-out; one that asks all at once pays it no heed.
+        ``stop_after``: a bus that queries one address after the other, each at the cost of a
+        time-out, stops after this number of drives; a bus that queries all addresses at once
+        ignores it.
         """
 
     async def enumerate(self, station: int, progress: Progress) -> Sequence[Described]:
-        """Objects and entries of the drive's own dictionary, each object before its entries.
+        """Return objects and entries of the drive's own dictionary, each object before its entries.
 
         Raises:
-            NotAllowed: drives on this kind of bus list nothing (`LinkTraits.description`).
+            NotAllowed: drives on this kind of bus do not list objects (`LinkTraits.description`).
         """
 
     async def read(self, station: int, address: Address) -> bytes:
-        """Read one value, little endian, exactly as long as its type (text: as sent)."""
+        """Read one value, little endian, with exactly the length of its type (text: as sent)."""
 
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several, batched as the bus allows. One failure does not spoil the others."""
+        """Read several values in batches. A failure does not affect the other values."""
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
-        """Write one value. A timed-out write raises LinkTimeout and is never repeated here."""
+        """Write one value. A write that times out raises LinkTimeout and is never repeated here."""
 
     def quality(self, station: int | None = None) -> LinkQuality:
-        """Counters for one station or the whole bus. Never blocks."""
+        """Return the counters of one station or of the whole bus. Never blocks."""
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be notified of events, on the event loop's thread."""
+        """Subscribe to events; the listener is called on the event loop's thread."""
 
 
 @dataclass(frozen=True, slots=True)
 class ScopeBlock:
     """A run of equally spaced samples.
 
-    ``samples`` has shape [n, k] for k ``channels`` in raw units scaled by nobody; ``t0_s`` is the
-    time of the first sample on the link's clock (monotonic), ``dt_s`` the spacing. ``dropped``
+    ``samples`` has shape [n, k] for k ``channels``, in unscaled raw units; ``t0_s`` is the time of
+    the first sample on the link's clock (monotonic), ``dt_s`` the spacing. ``dropped``
     counts samples lost since the previous block of this stream; ``valid`` [n] is False where the
-    working counter or the timing says that a sample cannot be trusted.
+    working counter or the timing shows that a sample cannot be trusted.
     """
 
     sequence: int
@@ -237,14 +238,14 @@ class ScopeBlock:
     times_s: npt.NDArray[np.float64] | None = None
     """True sampling times [n] of a polled block; None where the spacing is exact."""
     cycle: int | None = None
-    """Number of the first sample's cycle, as `Cyclic.play` counts them; None where polled."""
+    """Cycle number of the first sample, in the count that `Cyclic.play` returns; None if polled."""
 
 
 @dataclass(frozen=True, slots=True)
 class CyclicSignal:
-    """One process-data signal of one station, named ``channel`` in the blocks.
+    """One process-data signal of one station; ``channel`` is its name in the blocks.
 
-    An ``optional`` output is left out where the drive's process data have no place for it.
+    An ``optional`` output is omitted if the drive's process data have no room for it.
     """
 
     station: int
@@ -263,19 +264,20 @@ class Envelope:
     torque_max: float | None = None
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
-    """How 606Ch and 6064h hang together: they are compared then, the speed limit watches both."""
+    """Relation of 606Ch to 6064h. If set, both are compared and checked against ``speed_max``."""
     torque_off_only: bool = False
-    """Beyond a limit a torque only becomes zero, and the power goes a moment later. For an axis
-    that its closed brake holds, as a quick stop would push against the brake, and for pulses of a
-    motor whose phases are not known yet, as a quick stop would close a loop."""
+    """At a torque limit the setpoint only becomes zero, and the power is removed a moment later.
+    For an axis held by its closed brake, where a quick stop would push against the brake, and for
+    pulses to a motor whose phases are not yet known, where a quick stop would close a loop.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
     """One value per cycle for one setpoint object of one station.
 
-    ``values`` has shape [n] in raw units. ``renew_s`` is the life of the setpoint after the
-    last value or renewal: with none the loop ramps down by itself and leaves Operation enabled.
+    ``values`` has shape [n] in raw units. ``renew_s`` [s] is how long a setpoint stays valid after
+    the last value or renewal; without renewal the loop ramps down and leaves Operation enabled.
     """
 
     station: int
@@ -289,11 +291,12 @@ class Trajectory:
 
 @dataclass(frozen=True, slots=True)
 class Coupled:
-    """What holds for two trajectories on one machine: neither axis goes on when the other one is
-    stopped, and both stop when the difference of their ways changes by more than ``skew_max``.
+    """Coupling of two trajectories on one machine.
 
-    In raw increments of the first axis from ``zero``, the position of each; an increment of the
-    second axis is ``ratio`` of the first, negative where they count against each other.
+    If one axis is stopped, the other is stopped too, and both stop when the difference of their
+    travels changes by more than ``skew_max``. In raw increments of the first axis from ``zero``,
+    the position of each; an increment of the second axis is ``ratio`` of the first, negative if
+    they count in opposite directions.
     """
 
     zero: tuple[int, int]
@@ -302,67 +305,67 @@ class Coupled:
 
 
 class PlaysPairs(Protocol):
-    """An exchange whose loop can hold two axes together."""
+    """A cyclic exchange whose loop can couple two axes."""
 
     async def play_pair(self, pair: tuple[Trajectory, Trajectory], coupled: Coupled) -> int:
-        """As `Cyclic.play`, with this watched in every cycle until both axes are at rest."""
+        """Play as `Cyclic.play`, with ``coupled`` checked every cycle until both axes are idle."""
 
 
 class OwnsPowerState(Protocol):
-    """A loop that writes the control words, so that nobody else may."""
+    """A loop that writes the control words; no other code may write them."""
 
     async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
-        """Head for a power state; the axis brakes before it leaves Operation enabled."""
+        """Request a power state; the axis brakes before it leaves Operation enabled."""
 
     async def reset_fault(self, station: int) -> None:
         """Reset a fault once; the axis stays disabled."""
 
     def axis_state(self, station: int) -> LoopState:
-        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+        """Return power state, phase of the setpoints, and why the last motion was halted."""
 
 
 class TakesSpeeds(Protocol):
-    """An exchange that can give speeds with every cycle to a drive that has no cyclic mode."""
+    """A cyclic exchange that can send velocity setpoints to drives without a cyclic mode."""
 
     unguarded: frozenset[int]
-    """Stations commanded by the exchange whose drive would not notice that it ended."""
+    """Stations commanded by the exchange whose drive would not detect the end of the exchange."""
 
     def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
-        """Command ``station`` in Profile velocity from the next `configure` on, or not any more.
+        """Switch Profile velocity for ``station`` on or off, effective at the next `configure`.
 
-        Where speeds of the mode CSV are asked for, the mode is then Profile velocity.
+        Velocity setpoints requested in mode CSV are then sent in mode Profile velocity.
         """
 
 
 class Cyclic(Protocol):
     """Synchronous process data of a bus that has them (EtherCAT, CANopen with SYNC).
 
-    `power`, `speeds` and `pairs` are parts that an exchange may lack, and are None then.
+    `power`, `speeds` and `pairs` are optional parts; each is None in an exchange without it.
     """
 
     @property
     def power(self) -> OwnsPowerState | None:
-        """What commands the power states, where the loop writes the control words."""
+        """The part that commands the power states, where the loop writes the control words."""
 
     @property
     def speeds(self) -> TakesSpeeds | None:
-        """What gives speeds to drives without a cyclic mode."""
+        """The part that sends velocity setpoints to drives without a cyclic mode."""
 
     @property
     def pairs(self) -> PlaysPairs | None:
-        """What moves two axes of one machine together."""
+        """The part that moves two axes of one machine together."""
 
     @property
     def running(self) -> bool:
-        """Whether process data are exchanged."""
+        """Whether process data are being exchanged."""
 
     @property
     def trouble(self) -> Text | None:
-        """Why it does not run although it is wanted, while it is set up again; else None."""
+        """Why a requested exchange is not running, while it is set up again; None otherwise."""
 
     @property
     def dc(self) -> bool | None:
-        """Whether clocks in the drives rule the instant; None: the bus has none."""
+        """Whether clocks in the drives set the sampling instant; None: the bus has none."""
 
     @property
     def left_over(self) -> tuple[tuple[CyclicSignal, Text], ...]:
@@ -371,7 +374,7 @@ class Cyclic(Protocol):
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
     ) -> tuple[CyclicSignal, ...]:
-        """Map signals and return those that fit; the rest is for polling.
+        """Map signals and return those that fit; the others must be polled.
 
         Raises:
             NotAllowed: the mapping exceeds a limit of the drive, named in the message.
@@ -381,25 +384,25 @@ class Cyclic(Protocol):
         """Go to Operational and exchange process data."""
 
     async def stop(self) -> None:
-        """Ramp down whatever moves, then leave Operational."""
+        """Ramp down every moving axis, then leave Operational."""
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
-        """Play trajectories in step; returns the cycle counter of the first value."""
+        """Play trajectories in synchronism; return the cycle number of the first value."""
 
     async def renew(self, station: int) -> None:
-        """Extend the life of the setpoints of ``station`` by its renewal time."""
+        """Extend the validity of the setpoints of ``station`` by its renewal time."""
 
     async def halt(self, station: int | None = None) -> None:
-        """Controlled stop now, for one station or all; setpoints end."""
+        """Stop one station or all under control, now; setpoints end."""
 
     async def pause(self, station: int) -> None:
-        """Brake now and hold, enabled, for the next motion; nothing where nothing moves."""
+        """Brake now and hold, enabled, for the next motion; no effect if the axis is not moving."""
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """Raw values of the last cycle, without asking the drive.
+        """Return the raw values of the last cycle, without a request to the drive.
 
-        What is older than ``within_s``, came in an invalid cycle or is of a station that is lost
-        is not among them.
+        Values are omitted if they are older than ``within_s`` [s], are from an invalid cycle, or
+        belong to a lost station.
         """
 
     def blocks(self, consumer: Callable[[ScopeBlock], None]) -> Unsubscribe:

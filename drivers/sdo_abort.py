@@ -51,7 +51,7 @@ _KNOWN = frozenset(
 
 
 def abort_text(code: int) -> Text:
-    """The message for ``code``; unknown codes say so and keep their number (maker-specific)."""
+    """Return the message for ``code``; an unknown (manufacturer-specific) code keeps its number."""
     if code in _KNOWN:
         return text(f"sdo-abort.x{code:08x}")
     return text("sdo-abort.unknown", number=code)
@@ -60,7 +60,7 @@ def abort_text(code: int) -> Text:
 def rejected(
     code: int, *, drive: str | None = None, parameter: str | None = None, writing: bool = False
 ) -> Rejected:
-    """The error for an abort from the drive, with the code kept in the message."""
+    """Create the error for an abort by the drive; its message contains the code."""
     known = abort_text(code)
     action = "write-refused" if writing else "read-refused"
     listed = "" if code in _KNOWN else "unknown-"

@@ -7,7 +7,7 @@
     modbus:///dev/ttyUSB0?baudrate=115200&parity=N
     mlink:///dev/ttyUSB0?baudrate=2500000&parity=E
     mlink://COM3                                     (Windows)
-    mlink://virtual0                                 (a wire that the demo makes)
+    mlink://virtual0                                 (a wire created by the demo)
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ SCHEMES: tuple[LinkKind, ...] = get_args(LinkKind)
 
 
 def bus_kind(kind: LinkKind) -> BusKind:
-    """What this kind of bus brings; its link is imported when the first one is made."""
+    """Return the description of a kind of bus; the module of its link loads with the first link."""
     found: BusKind = importlib.import_module(f"drivers.{kind}.bus").BUS
     return found
 
 
 def parse_url(url: str) -> BusUrl:
-    """Take a bus URL apart.
+    """Parse a bus URL.
 
     Raises:
-        OutOfRange: no such scheme, no adapter named, one that is not of the forms in
-            `drivers.adapters`, or an option given twice.
+        OutOfRange: unknown scheme, no adapter, an adapter in a form that
+            `drivers.adapters` does not allow, or an option given twice.
     """
     match = re.fullmatch(r"([a-z]+)://([^?]*)(?:\?(.*))?", url.strip())
     scheme = next((known for known in SCHEMES if match and known == match[1]), None)
@@ -64,11 +64,11 @@ def parse_url(url: str) -> BusUrl:
 
 
 def link_for(url: str | BusUrl) -> Link:
-    """The link of a bus URL, not yet opened.
+    """Create the link of a bus URL without opening it.
 
     Raises:
         OutOfRange: the URL is wrong.
-        NotAllowed: a virtual wire outside the demo that makes it.
+        NotAllowed: a virtual wire, which exists only inside the demo.
     """
     bus = parse_url(url) if isinstance(url, str) else url
     if bus.is_virtual:

@@ -1,4 +1,4 @@
-"""What a drive is: its parameters, faults, procedures and peculiarities, as data."""
+"""Drive families as data: parameters, faults, procedures and peculiarities."""
 
 from profiles.loader import STANDARD, drive_names, load_all, load_profile
 from profiles.schema import Parameter, Profile

@@ -1,4 +1,4 @@
-"""What a maker's file prescribes for the way of an EtherCAT slave to Operational.
+"""What a manufacturer's file prescribes on the way of an EtherCAT slave to Operational.
 
 Source: ETG.2000 v1.0.10, clauses 6.4 (mailbox), 6.5 (sync managers), 6.7 (state machine), 6.9
 (distributed clocks) and 6.12 (registers of the slave controller).
@@ -31,7 +31,7 @@ class InitCommand(Frozen):
 
     @property
     def raw(self) -> bytes:
-        """The bytes as they travel."""
+        """The data as transferred."""
         return bytes.fromhex(self.data)
 
 
@@ -49,7 +49,7 @@ class SyncManagerRule(Frozen):
 
 
 class CoeRules(Frozen):
-    """Flags of the CoE mailbox; None where the file does not say."""
+    """Flags of the CoE mailbox; None where the file does not state them."""
 
     sdo_info: bool | None = None
     pdo_assign: bool | None = Field(default=None, description="1C12h and 1C13h can be written")
@@ -69,7 +69,7 @@ class WatchdogRegisters(Frozen):
 
     @property
     def process_data_ns(self) -> int | None:
-        """The process-data watchdog [ns]; None where the file gives none, or switches it off."""
+        """The process-data watchdog [ns]; None if the file states none, or disables it."""
         if not self.process_data:
             return None
         divider = 0x09C2 if self.divider is None else self.divider
@@ -79,7 +79,7 @@ class WatchdogRegisters(Frozen):
 class SyncSignal(Frozen):
     """Cycle [ns] of SYNC0 or SYNC1 and its shift [ns].
 
-    ``cycle_ns`` 0 means the cycle of the process data times ``factor``, divided where it is
+    ``cycle_ns`` 0 means the cycle of the process data times ``factor``, or divided by it if
     negative.
     """
 
@@ -88,7 +88,7 @@ class SyncSignal(Frozen):
     shift_ns: int = 0
 
     def period_ns(self, cycle_ns: int) -> int:
-        """The cycle [ns] for process data of this cycle [ns]."""
+        """Return the cycle [ns] for process data with this cycle [ns]."""
         if self.cycle_ns:
             return self.cycle_ns
         if self.factor < 0:
@@ -97,7 +97,7 @@ class SyncSignal(Frozen):
 
 
 PLAIN_ACTIVATE = 0x0300
-"""SYNC0 alone: for a drive whose profile names no operation mode."""
+"""SYNC0 alone: for a drive whose profile has no operation mode."""
 
 
 class ModePdos(Frozen):
@@ -121,7 +121,7 @@ class ClockMode(Frozen):
 
 
 class StateTimeouts(Frozen):
-    """How long the slave may take [ms]; None where the file does not say."""
+    """Time-outs of the slave [ms]; None where the file does not state them."""
 
     preop_ms: int | None = Field(default=None, ge=0)
     safeop_op_ms: int | None = Field(default=None, ge=0)
@@ -147,24 +147,24 @@ class BringUp(Frozen):
     source: str
 
     def sync_manager(self, kind: SyncManagerKind) -> SyncManagerRule | None:
-        """The first sync manager of this kind."""
+        """Return the first sync manager of this kind."""
         return next((each for each in self.sync_managers if each.kind == kind), None)
 
     @property
     def clock_mode(self) -> ClockMode | None:
-        """The first mode with distributed clocks; None where there is none."""
+        """The first mode with distributed clocks; None if there is none."""
         return next((mode for mode in self.clock_modes if mode.assign_activate), None)
 
     @property
     def assign_activate(self) -> int:
-        """For 0980h; 0, without SYNC0, where the file names modes and none has a clock."""
+        """Value for 0980h; 0 (no SYNC0) if the file has modes but none with a clock."""
         mode = self.clock_mode
         if mode is None:
             return 0 if self.clock_modes else PLAIN_ACTIVATE
         return mode.assign_activate
 
     def mode_pdos(self, sync_manager: int) -> tuple[int, ...]:
-        """PDOs that the mode in use assigns to a sync manager; empty where it says nothing."""
+        """Return the PDOs that the mode in use assigns to a sync manager; empty if not stated."""
         mode = self.clock_mode or next(iter(self.clock_modes), None)
         found = (
             (each.pdos for each in mode.pdos if each.sync_manager == sync_manager) if mode else ()

@@ -1,4 +1,4 @@
-"""Checks of a profile beyond its schema, and how much of each manual chapter it covers."""
+"""Checks of a profile beyond its schema, and its coverage of each manual chapter."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from profiles.schema import INTEGER_RANGE, Chapter, Fault, HomingMethod, Paramet
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something a reviewer must look at: where, and a message of the catalogue with its facts.
+    """Something a reviewer must check: the place, and a message of the catalogue with its facts.
 
-    Words are made where it is shown (`drivers.texts.checks`).
+    Words are generated where it is shown (`drivers.texts.checks`).
     """
 
     key: str
@@ -29,14 +29,14 @@ class Finding:
 
 
 def found(key: str, code: str, /, **params: str | int | float) -> Finding:
-    """A finding with its facts by name."""
+    """Return a finding with its facts by name."""
     return Finding(key, code, params)
 
 
 def check(profile: Profile) -> list[Finding]:
-    """What is wrong or unlikely; empty for a sound profile.
+    """Return what is wrong or unlikely; empty for a correct profile.
 
-    A default outside its range is allowed where a note or a second printing says so.
+    A default outside its range is allowed if a note or a second printing states it.
     """
     findings: list[Finding] = []
     for parameter in profile.parameters:
@@ -49,21 +49,21 @@ def check(profile: Profile) -> list[Finding]:
 
 
 def motion_counts(profile: Profile) -> dict[Motion, int]:
-    """How many writable parameters have each motion class, all three named."""
+    """Return how many writable parameters have each motion class, all three listed."""
     counts = Counter(p.motion for p in profile.parameters if p.motion is not None)
     return {motion: counts[motion] for motion in get_args(Motion)}
 
 
 def unclassified(profile: Profile) -> list[Parameter]:
-    """Writable parameters whose class nobody has given: they count as ``energises``."""
+    """Return writable parameters without a motion class: they count as ``energises``."""
     return [p for p in profile.parameters if p.motion_origin == "unclassified"]
 
 
 def _check_motion(profile: Profile) -> list[Finding]:
-    """Every writable object has a motion class from exactly one rule, and no rule is left over.
+    """Check that every writable object has its class from one rule, and that all rules are used.
 
-    A profile made from a maker's file has objects that nobody has classified yet; that is its
-    normal state and the count shows how many.
+    A profile made from a manufacturer's file has objects without a class; that is its normal state,
+    and the count shows how many.
     """
     findings: list[Finding] = []
     if not profile.from_description:
@@ -85,7 +85,7 @@ def _check_motion(profile: Profile) -> list[Finding]:
 
 
 def _check_chapters(profile: Profile) -> list[Finding]:
-    """No line of the manual outside a chapter, and none without records or a reason."""
+    """Check that every line of the manual is in a chapter with records or a reason."""
     findings: list[Finding] = []
     expected = 1
     for chapter in profile.manual_chapters:
@@ -100,7 +100,7 @@ def _check_chapters(profile: Profile) -> list[Finding]:
 
 
 def counts_of(profile: Profile, chapter: Chapter) -> dict[str, int]:
-    """How many records of each kind name a line of this chapter, their notes included."""
+    """Return how many records of each kind refer to a line of this chapter, including notes."""
     lines = range(chapter.first_line, chapter.last_line + 1)
 
     def inside(*texts: str) -> bool:
@@ -176,7 +176,7 @@ def _check_parameter(profile: Profile, p: Parameter) -> list[Finding]:
 
 
 def _check_number(p: Parameter) -> list[Finding]:
-    """Pgg.nn is object 2000h + gg, subindex nn + 1 (002 and 000, chapters on parameters)."""
+    """Check that Pgg.nn is object 2000h + gg, subindex nn + 1 (002 and 000, on parameters)."""
     numbered = re.fullmatch(r"P(\d+)\.(\d+)", p.number or "")
     if numbered is None:
         return []
@@ -188,7 +188,7 @@ def _check_number(p: Parameter) -> list[Finding]:
 
 
 def coverage(profile: Profile) -> list[str]:
-    """A line per chapter of the manual: what of it is in the profile."""
+    """Return a line per chapter of the manual: what of it is in the profile."""
     lines = [_chapter_line(profile, chapter) for chapter in profile.manual_chapters]
     lines += [f"{chapter}: {text}" for chapter, text in profile.chapters.items()]
     groups = Counter(p.group for p in profile.parameters)

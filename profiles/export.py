@@ -1,4 +1,4 @@
-"""A profile in the one stable form for reviewers and scripts, and the schema for editors."""
+"""A profile in a stable form for reviewers and scripts, and the schema for editors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ SCHEMA_FILE = Path(__file__).with_name("profile.schema.json")
 
 
 def show(profile: Profile) -> dict[str, object]:
-    """The whole profile as `servodeck profile show --json` prints it."""
+    """Return the whole profile as printed by `servodeck profile show --json`."""
     return {
         "drive": profile.drive,
         "identity": profile.identity.model_dump(mode="json"),
@@ -69,5 +69,5 @@ def _fault(f: Fault) -> dict[str, object]:
 
 
 def json_schema() -> str:
-    """JSON Schema of a whole profile, for editors."""
+    """Return the JSON Schema of a whole profile, for editors."""
     return json.dumps(Profile.model_json_schema(), indent=1, ensure_ascii=False) + "\n"

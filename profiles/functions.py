@@ -1,7 +1,7 @@
-"""What a family's functions consist of: which parameters belong together, and how they are used.
+"""Functions of a family: which parameters belong together, and how they are used.
 
 A page shows a function by this description and never by the name of a drive. Keys refer to
-parameters of the same profile. What a manual does not print is left out, not guessed.
+parameters of the same profile. Information missing in a manual is left out, not guessed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class ParameterGroup(Frozen):
 
 
 class GainBlock(Frozen):
-    """Parameters that sit at one place of the control loops.
+    """Parameters that belong to one block of the control loops.
 
     ``set_number`` distinguishes the gain sets between which a drive switches.
     """
@@ -42,7 +42,7 @@ class GainBlock(Frozen):
 
 
 class HistorySlot(Frozen):
-    """One remembered fault that has parameters of its own; ``name`` empty: named by its number."""
+    """One stored fault with parameters of its own; ``name`` empty: named by its number."""
 
     name: str = ""
     code_key: str
@@ -50,10 +50,10 @@ class HistorySlot(Frozen):
 
 
 class FaultHistory(Frozen):
-    """Where a drive keeps its past faults.
+    """Where a drive stores its past faults.
 
     *slots*: each record has parameters of its own, newest first. *selected*: writing a number to
-    ``select_key`` brings one record to the same parameters. *unreadable*: the drive keeps
+    ``select_key`` selects the record that the same parameters show. *unreadable*: the drive stores
     records for which the manual prints no object.
     """
 
@@ -79,10 +79,10 @@ class TerminalBits(Frozen):
 
 
 class Forcing(Frozen):
-    """A way to overrule terminals: outputs that are forced, or inputs that are simulated.
+    """A way to override terminals: outputs that are forced, or inputs that are simulated.
 
-    A terminal is overruled while its bit in ``enable`` is set, and then follows its bit in
-    ``value``. Without ``enable`` a set bit in ``value`` overrules by itself and only to "on".
+    A terminal is overridden while its bit in ``enable`` is set, and then follows its bit in
+    ``value``. Without ``enable``, a set bit in ``value`` overrides by itself and only to "on".
     """
 
     name: Literal["outputs", "simulation"]
@@ -100,7 +100,7 @@ class Forcing(Frozen):
 
 
 class TerminalFacts(Frozen):
-    """States, polarities and overruling of the terminals."""
+    """States, polarities and overriding of the terminals."""
 
     states: tuple[TerminalBits, ...] = ()
     polarities: tuple[TerminalBits, ...] = ()
@@ -132,7 +132,7 @@ class TouchProbe(Frozen):
 
 
 class BrakeTiming(Frozen):
-    """Holding brake: which parameters hold the times of its course.
+    """Holding brake: the parameters with the times of its sequence.
 
     ``open_fixed_ms`` is a printed time that cannot be set.
     """
@@ -154,10 +154,10 @@ class BrakeTiming(Frozen):
 
 
 class BrakeTest(Frozen):
-    """How the holding brake stays closed while the axis is enabled, so that it can be tested.
+    """How the holding brake can be kept closed while the axis is enabled, to test it.
 
-    Either ``output_function`` (a function that never switches the brake's output on by itself,
-    given to it meanwhile) or ``obstacle``: why the drive has no such way.
+    Either ``output_function`` (a function that never switches the brake output on by itself,
+    assigned to it for the test) or ``obstacle``: why the drive has no such way.
     """
 
     output_function: int | None = None
@@ -176,7 +176,7 @@ class BrakeTest(Frozen):
 
 
 class ResistorModel(Frozen):
-    """What a manual's table says of braking with one model; None where it prints nothing."""
+    """Braking data of one model in the manual's table; None where it prints nothing."""
 
     model: str
     resistance_ohm: float | None = None
@@ -208,11 +208,11 @@ IdentificationState = Literal[
     "inertia_limited", "complete", "homing", "acceleration_design", "error_handling", "error",
     "waiting", "jog_homing",
 ]  # fmt: skip
-"""What a drive does while it identifies; ``limited`` is within a range of travel."""
+"""State of a drive's own identification; ``limited``: within a range of travel."""
 
 
 class DriveIdentification(Frozen):
-    """Identification that a bit of the control word starts, while an object counts its states."""
+    """Identification started by a bit of the control word; an object reports its state."""
 
     control_bit: int = Field(ge=0, le=15)
     status_key: str
@@ -228,7 +228,7 @@ class DriveIdentification(Frozen):
 
 
 class GuideStep(Frozen):
-    """One step of a guide: text, parameters to look at, and a procedure to run."""
+    """One step of a guide: text, parameters to check, and a procedure to run."""
 
     title: str
     text: str
@@ -240,7 +240,7 @@ class GuideStep(Frozen):
 
 
 class Guide(Frozen):
-    """A course that a person goes through step by step."""
+    """A sequence that a person follows step by step."""
 
     name: Literal["pole_identification", "identification"]
     title: str
@@ -252,7 +252,7 @@ class Guide(Frozen):
 
 
 class GearLimits(Frozen):
-    """Bounds on the electronic gear: encoder increments per user increment."""
+    """Limits of the electronic gear: encoder increments per user increment."""
 
     min_ratio: float | None = None
     max_ratio: float | None = None
@@ -273,7 +273,7 @@ class GearLimits(Frozen):
 
 
 class Functions(Frozen):
-    """Everything a family's pages need beyond its parameters, faults and procedures."""
+    """Everything that a family's pages need beyond its parameters, faults and procedures."""
 
     groups: tuple[ParameterGroup, ...] = ()
     gain_blocks: tuple[GainBlock, ...] = ()
@@ -289,7 +289,7 @@ class Functions(Frozen):
 
 
 def referenced_keys(functions: Functions) -> list[str]:
-    """Every parameter key that the functions refer to."""
+    """Return every parameter key that the functions refer to."""
     found: list[str] = []
     for group in functions.groups:
         found += group.keys
@@ -330,7 +330,7 @@ def _history_keys(history: FaultHistory | None) -> list[str]:
 
 
 def _named_keys(record: Frozen | None) -> list[str]:
-    """Fields called ``…_key``, ``keys`` or ``also_one``."""
+    """Return the values of fields named ``…_key``, ``keys`` or ``also_one``."""
     found: list[str] = []
     for name in type(record).model_fields if record is not None else ():
         value = getattr(record, name)

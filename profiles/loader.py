@@ -1,9 +1,9 @@
 """Reads the YAML of a drive family into a checked, frozen Profile.
 
-A family is a folder ``profiles/<drive>/`` of ``*.yaml`` files. Each file holds a mapping whose
+A family is a folder ``profiles/<drive>/`` of ``*.yaml`` files. Each file contains a mapping whose
 keys are fields of `Profile`; lists of the same field in several files are joined in file-name
-order, so that a long parameter list can be one file per chapter. The parsed result is cached
-next to the user's other caches, keyed by the content of every file and of the schema.
+order, so that a long parameter list can be one file per chapter. The parsed result is cached next
+to the user's other caches, keyed by the content of every file and of the schema.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from profiles.language.standard_help import HELP_FILE, with_standard_help
 from profiles.motion.classify import STANDARD_FILE, classified
 from profiles.schema import Profile
 
-#: The profile of a CiA 402 drive of which nothing else is known.
+#: The profile for an otherwise unknown CiA 402 drive.
 STANDARD = "generic402"
 _HERE = Path(__file__).parent
-#: libyaml's loader where PyYAML was built with it; ten times as fast.
+#: libyaml's loader if PyYAML was built with it; ten times as fast.
 _SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
@@ -38,9 +38,9 @@ CLASS_FIELDS = frozenset({"motion", "safe_in_motion", "motion_origin", "motion_r
 
 
 class ProfileError(Exception):
-    """A profile file is wrong: a code of the catalogue, and facts that name file and place.
+    """A profile file is wrong: a code of the catalogue, and facts that state file and place.
 
-    Words are made where it is shown (`drivers.texts.profile_errors`).
+    Words are generated where it is shown (`drivers.texts.profile_errors`).
     """
 
     def __init__(self, code: str, /, **params: str | int) -> None:
@@ -54,19 +54,19 @@ class ProfileError(Exception):
 
 
 def user_folder() -> Path:
-    """Where the user's own and imported profiles lie; it need not exist."""
+    """Return the folder of the user's own and imported profiles; it need not exist."""
     chosen = os.environ.get("SERVODECK_PROFILES")
     return Path(chosen) if chosen else Path(platformdirs.user_data_dir("servodeck")) / "profiles"
 
 
 def drive_names() -> tuple[str, ...]:
-    """Names of all families that have a folder here or in the user's folder, sorted."""
+    """Return the names of all families with a folder here or in the user's folder, sorted."""
     folders = (_HERE, user_folder())
     return tuple(sorted({p.parent.name for f in folders for p in f.glob("*/profile.yaml")}))
 
 
 def load_profile(drive: str) -> Profile:
-    """Load one family. A profile of the user's own is loaded again when its files have changed.
+    """Load one family. A profile of the user's own is reloaded when its files have changed.
 
     Raises:
         ProfileError: unknown drive, broken YAML, or a record that the schema refuses.
@@ -79,12 +79,12 @@ def load_profile(drive: str) -> Profile:
 
 
 def is_own(drive: str) -> bool:
-    """Whether a family lies in the user's folder; one that comes with servodeck goes first."""
+    """Return whether a family is in the user's folder; those of servodeck take precedence."""
     return not (_HERE / drive / "profile.yaml").exists()
 
 
 class _Version(NamedTuple):
-    """A file as it was at some time: an edited profile is another one for the cache."""
+    """A file with its time: an edited profile is a different one for the cache."""
 
     path: Path
     mtime_ns: int
@@ -102,15 +102,15 @@ def _load(drive: str, versions: tuple[_Version, ...]) -> Profile:
 
 
 def load_all() -> dict[str, Profile]:
-    """All families by name, without the user's own that are broken (see `broken_profiles`)."""
+    """Return all families by name, without broken ones of the user (see `broken_profiles`)."""
     broken = broken_profiles()
     return {name: load_profile(name) for name in drive_names() if name not in broken}
 
 
 def broken_profiles() -> dict[str, ProfileError]:
-    """The user's own profiles that cannot be used, and why.
+    """Return the user's own profiles that cannot be used, and why.
 
-    One slip in an edited file must not keep every other drive from being found.
+    One error in an edited file must not prevent all other drives from being found.
     """
     found: dict[str, ProfileError] = {}
     for name in filter(is_own, drive_names()):
@@ -162,7 +162,7 @@ def parse_profile(texts: dict[str, str]) -> Profile:
         ) from error
 
 
-#: Kinds of quirks of version 0.2.0 that no code acted upon: notes since.
+#: Kinds of quirks of version 0.2.0 that no code uses: they are notes now.
 _NOTES_ONCE = frozenset({
     "eeprom_on_every_write", "saving_mask", "trigger_bits_manual", "mode_change_pause",
     "no_following_error_bit", "home_found_bit_15", "save_readback_ambiguous", "sdo_pause_on_save",
@@ -172,7 +172,7 @@ _NOTES_ONCE = frozenset({
 
 
 def _move_notes(merged: dict[str, Any]) -> None:
-    """A profile of the user's own from version 0.2.0 is read as one of today."""
+    """Convert a profile of the user's own from version 0.2.0 to the present form."""
     quirks = merged.get("quirks")
     if not isinstance(quirks, list):
         return
@@ -186,10 +186,10 @@ def _move_notes(merged: dict[str, Any]) -> None:
 
 
 def _refuse_own_classes(merged: dict[str, Any]) -> None:
-    """Motion classes have one place: the rules, which give each a reason.
+    """Require that motion classes are only in the rules, which state a reason for each.
 
     Raises:
-        ProfileError: a parameter's row gives a class itself.
+        ProfileError: the record of a parameter states a class itself.
     """
     rows = merged.get("parameters")
     for row in rows if isinstance(rows, list) else ():
@@ -203,7 +203,7 @@ def _refuse_own_classes(merged: dict[str, Any]) -> None:
 
 
 def _explain(merged: dict[str, Any], error: ValidationError) -> str:
-    """Of each error its place in the file, and what the schema's library says to it."""
+    """Return for each error its place in the file, and the message of the schema's library."""
     lines: list[str] = []
     for item in error.errors()[:20]:
         record: Any = merged
@@ -229,8 +229,9 @@ def _cache_path(drive: str, files: list[Path]) -> Path:
 
 
 def _is_foreign(path: Path) -> bool:
-    """Whether somebody else may have written it. Windows says it by the place alone: the user's
-    own cache folder is theirs, any other one is not known to be.
+    """Return whether somebody else may have written it.
+
+    On Windows only the place decides: the user's own cache folder is trusted, any other is not.
     """
     if sys.platform == "win32":
         return not path.is_relative_to(platformdirs.user_cache_dir("servodeck"))
@@ -239,7 +240,7 @@ def _is_foreign(path: Path) -> bool:
 
 def _read_cache(path: Path) -> Profile | None:
     try:
-        if _is_foreign(path):  # a pickle from another user is not to be trusted
+        if _is_foreign(path):  # a pickle from another user must not be trusted
             return None
         loaded = pickle.loads(path.read_bytes())  # noqa: S301 - our own file, owner checked
     except (OSError, AttributeError, EOFError, ImportError, pickle.UnpicklingError):
@@ -248,7 +249,7 @@ def _read_cache(path: Path) -> Profile | None:
 
 
 def _write_cache(path: Path, profile: Profile) -> None:
-    """Best effort: a read-only or full disk costs speed, not function."""
+    """Write the cache if possible: a read-only or full disk only costs time."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         for old in path.parent.glob(f"profile-{profile.drive}-*.pickle"):

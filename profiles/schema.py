@@ -1,8 +1,8 @@
-"""The shape of a drive profile.
+"""The schema of a drive profile.
 
-Everything is frozen and refuses unknown fields, so that a typing slip in a YAML file is an
-error at load time and never a silently missing limit. The vocabulary is closed: a new literal
-is added only for something a manual documents.
+Every model is frozen and refuses unknown fields, so that a typing error in a YAML file is an error
+at load time and never a silently missing limit. The vocabulary is closed: a new literal is added
+only for something a manual documents.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Effective = Literal["now", "stopped", "reenable", "write_settings", "power_cycle
 Settable = Literal["any", "stopped"]
 LinkKind = Literal["ethercat", "canopen", "modbus", "mlink"]
 #: ``command`` is the fault reset (6040h bit 7 or the family's own), ``automatic`` the end of the
-#: cause itself, ``special`` a step of its own that the fault's ``reset`` text names.
+#: cause itself, ``special`` a separate step described in the fault's ``reset`` text.
 ResetBy = Literal["command", "power_cycle", "automatic", "special", "unknown"]
 Raw = int | float | str
 
@@ -98,12 +98,12 @@ class Parameter(Frozen):
 
     @cached_property
     def index(self) -> int | None:
-        """Object index, or None for a parameter that only Modbus reaches."""
+        """Object index, or None for a parameter that only Modbus can access."""
         return None if self.key.startswith("PA_") else int(self.key[:4], 16)
 
     @cached_property
     def subindex(self) -> int | None:
-        """Object subindex, or None for a parameter that only Modbus reaches."""
+        """Object subindex, or None for a parameter that only Modbus can access."""
         return None if self.key.startswith("PA_") else int(self.key[5:], 16)
 
     @property
@@ -113,7 +113,7 @@ class Parameter(Frozen):
 
     @property
     def raw_limits(self) -> tuple[int | float | None, int | float | None]:
-        """Printed limits, falling back to those of the integer type."""
+        """Printed limits, or those of the integer type where none are printed."""
         low, high = INTEGER_RANGE.get(self.type, (None, None))
         return (
             low if self.min_raw is None else self.min_raw,
@@ -121,15 +121,15 @@ class Parameter(Frozen):
         )
 
     def to_raw(self, value: float) -> int | float:
-        """Engineering value to the nearest raw value."""
+        """Convert an engineering value to the nearest raw value."""
         raw = (value - self.offset) / self.scale
         return round(raw) if self.is_integer else raw
 
     def to_value(self, raw: Raw) -> Raw:
-        """Raw value to engineering value; text and unscaled integers pass unchanged."""
+        """Convert a raw value to an engineering value; text and unscaled numbers pass unchanged."""
         if isinstance(raw, str) or (self.scale == 1.0 and self.offset == 0.0):
             return raw
-        # Scales such as 0.1 are not exact in binary: 12 digits hide that, nothing else.
+        # Scales such as 0.1 are not exact in binary: rounding to 12 digits hides only that.
         return float(f"{raw * self.scale + self.offset:.12g}")
 
     @model_validator(mode="after")
@@ -140,7 +140,7 @@ class Parameter(Frozen):
 
 
 class Fault(Frozen):
-    """A fault or warning with what to do about it."""
+    """A fault or warning with its remedies."""
 
     code: str = Field(description="as the drive reports it: 0x7305, Er.013, AL.101, 1001 …")
     name: str
@@ -174,7 +174,7 @@ class WriteStep(Frozen):
 
 
 class WaitStep(Frozen):
-    """Leave the drive alone: no traffic to it for this long (a drive that is storing to flash)."""
+    """Send nothing to the drive for this time (a drive that is storing to flash)."""
 
     do: Literal["wait"]
     seconds: float = Field(gt=0)
@@ -192,7 +192,7 @@ class PollStep(Frozen):
 
 
 class ConfirmStep(Frozen):
-    """The user must agree to this text before anything further is written."""
+    """The user must confirm this text before anything further is written."""
 
     do: Literal["confirm"]
     text: str
@@ -221,10 +221,10 @@ Step = Annotated[
 
 
 class Procedure(Frozen):
-    """A named sequence. Well-known names have a place of their own on the page.
+    """A named sequence. Well-known names have a fixed place on the page.
 
-    Well-known: save, restore, reset, write_settings, zero_position, clear_history,
-    fault_reset, tuning_begin, tuning_end, identify.
+    Well-known: save, restore, reset, write_settings, zero_position, clear_history, fault_reset,
+    tuning_begin, tuning_end, identify.
     """
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -261,7 +261,7 @@ class IoFunction(Frozen):
 
 
 class IoTerminal(Frozen):
-    """A digital terminal: which parameter selects its function and polarity."""
+    """A digital terminal: the parameters that select its function and polarity."""
 
     name: str
     direction: Literal["in", "out"]
@@ -287,7 +287,7 @@ class NotchSlot(Frozen):
 
 
 class NotchSpec(Frozen):
-    """How this family writes notches down."""
+    """How this family represents notch filters."""
 
     encoding: Literal["coefficients", "hz_width", "hz_levels", "hz_width_db"]
     slots: tuple[NotchSlot, ...]
@@ -315,10 +315,10 @@ class StiffnessTable(Frozen):
 
 
 class GainSpec(Frozen):
-    """Which parameters hold the loop gains, and what their values mean.
+    """The parameters of the loop gains, and the meaning of their values.
 
-    ``convention``: *bandwidth* (loop bandwidth in Hz), *gain* (1/s position, Hz speed,
-    ms integral time), *unit* (numbers without a printed physical meaning).
+    ``convention``: *bandwidth* (loop bandwidth in Hz), *gain* (1/s position, Hz speed, ms integral
+    time), *unit* (numbers without a printed physical meaning).
     """
 
     convention: Literal["bandwidth", "gain", "unit"]
@@ -342,9 +342,9 @@ class GainSpec(Frozen):
 class SlowVibrationSpec(Frozen):
     """The drive's own filter of the position command against one slow vibration.
 
-    ``frequency`` takes the frequency of the vibration, ``period`` its period: the time of a moving
+    ``frequency`` holds the frequency of the vibration, ``period`` its period: the time of a moving
     average. ``also`` are raw values that belong to it. ``unstated`` are parameters of the filter
-    whose unit or meaning the manual does not print, so that no value can be named for them.
+    whose unit or meaning the manual does not print, so that no value can be proposed for them.
     """
 
     frequency: str | None = None
@@ -355,7 +355,7 @@ class SlowVibrationSpec(Frozen):
 
 
 class Signal(Frozen):
-    """A quantity that the scope, the axis and the tools know by role, and where it lives."""
+    """A quantity that the scope, the axis and the tools use by role, and its parameter."""
 
     role: Literal[
         "status_word", "control_word", "mode", "mode_display", "error_code",
@@ -387,10 +387,10 @@ SCALE_KEYS = (
 
 
 class UnitSpec(Frozen):
-    """Units of the motion objects and where the resolution comes from.
+    """Units of the motion objects and the source of the resolution.
 
-    ``origins`` says of each unit who states it. A unit that is only the standard's default counts
-    for nothing by itself: makers use others.
+    ``origins`` states the origin of each unit. A unit that is only the standard's default is not
+    reliable: manufacturers use others.
     """
 
     position: str = "inc"
@@ -419,21 +419,21 @@ class UnitSpec(Frozen):
 
 
 class PdoPart(Frozen):
-    """A stretch of a PDO: an object of which ``bits`` are mapped, or with no key padding."""
+    """A part of a PDO: an object of which ``bits`` are mapped, or padding without a key."""
 
     key: str | None = None
     bits: int = Field(ge=1, le=64 * 8)
 
 
 class PdoIdentifier(Frozen):
-    """The CAN identifier (COB-ID) of a PDO as the maker delivers it."""
+    """The default CAN identifier (COB-ID) of a PDO."""
 
     cob_id: int = Field(ge=1, le=0x7FF, description="with `of_node` the node-ID is added")
     of_node: bool
     fixed: bool = Field(default=False, description="14xxh:01 or 18xxh:01 cannot be written")
 
     def at(self, node: int) -> int:
-        """The identifier of a node."""
+        """Return the identifier for a node."""
         return (self.cob_id + node if self.of_node else self.cob_id) & 0x7FF
 
 
@@ -481,9 +481,10 @@ class PdoSpec(Frozen):
     notes: str = ""
 
     def free_set(self, direction: Literal["rx", "tx"]) -> int | None:
-        """The PDO whose contents are written: the default, or where that is fixed another free one.
+        """Return the PDO whose contents are written: the default, or another free one if that is
+        fixed.
 
-        None: nothing of this direction can be remapped.
+        None: nothing in this direction can be remapped.
         """
         if not self.remappable:
             return None
@@ -496,7 +497,7 @@ class PdoSpec(Frozen):
 
 
 class Watchdog(Frozen):
-    """What stops the axis when the link dies."""
+    """What stops the axis when the link fails."""
 
     present: bool
     key: str | None = None
@@ -505,7 +506,7 @@ class Watchdog(Frozen):
 
 
 class LinkSpec(Frozen):
-    """How this family is reached over one kind of link."""
+    """How this family is accessed over one kind of link."""
 
     kind: LinkKind
     watchdog: Watchdog
@@ -524,7 +525,7 @@ class LinkSpec(Frozen):
 
 
 class Identity(Frozen):
-    """What a scan must see to recognise the family. None: not printed in the manual."""
+    """Values in a scan that identify the family. None: not printed in the manual."""
 
     maker: str
     model: str
@@ -539,7 +540,7 @@ class Identity(Frozen):
 
 
 class Quirk(Frozen):
-    """A documented deviation that code acts upon: each kind has a reader. See also `Note`."""
+    """A documented deviation that code uses: each kind has a reader. See also `Note`."""
 
     kind: Literal[
         "write_settings", "limit_bits_swapped", "own_status_word", "enable_pause",
@@ -554,7 +555,7 @@ class Quirk(Frozen):
 
 
 class Note(Frozen):
-    """What whoever uses the drive must know of it, and no code acts upon."""
+    """Information for users of the drive that no code uses."""
 
     key: str | None = None
     help: str
@@ -562,14 +563,14 @@ class Note(Frozen):
 
 
 class Conflict(Frozen):
-    """Two places of the manual that contradict each other, where no single parameter fits."""
+    """Two contradictory places of the manual that do not concern a single parameter."""
 
     text: str
     source: str
 
 
 class Chapter(Frozen):
-    """A chapter of the manual by its lines, so that the check can count what was used of it."""
+    """A chapter of the manual by its lines, so that the check can count its use."""
 
     title: str
     first_line: int = Field(ge=1)
@@ -579,7 +580,7 @@ class Chapter(Frozen):
 
 
 class Profile(Frozen):
-    """Everything that is known about a drive family."""
+    """All data on a drive family."""
 
     drive: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     title: str
@@ -628,12 +629,12 @@ class Profile(Frozen):
 
     @property
     def from_description(self) -> bool:
-        """Made from a maker's file or a drive's own dictionary, not from a numbered manual."""
+        """Made from a manufacturer's file or a drive's own dictionary, not from a manual."""
         return not (self.manual.isdigit() or self.manual == "CiA")
 
     @cached_property
     def unit_keys(self) -> frozenset[str]:
-        """Parameters that change what a position increment or another motion unit is."""
+        """Parameters that change the size of a position increment or another motion unit."""
         units = self.units
         keys = [units.gear_numerator, units.gear_denominator, units.feed, units.feed_revolutions]
         keys += [quirk.key for quirk in self.quirks if quirk.kind == "unit_switch"]
@@ -646,22 +647,22 @@ class Profile(Frozen):
         return {s.role: self.by_key[s.key] for s in self.signals}
 
     def parameter(self, key: str) -> Parameter | None:
-        """The parameter with this key or maker's number (case-insensitive), or None."""
+        """Return the parameter with this key (in any case) or manufacturer's number, or None."""
         found = self.by_key.get(key) or self.by_key.get(key.upper())
         if found is None:
             found = next((p for p in self.parameters if p.number and p.number == key), None)
         return found
 
     def link(self, kind: str) -> LinkSpec | None:
-        """How this family is reached over ``kind``, or None."""
+        """Return how this family is accessed over ``kind``, or None."""
         return next((spec for spec in self.links if spec.kind == kind), None)
 
     def procedure(self, name: str) -> Procedure | None:
-        """The procedure of this name, or None."""
+        """Return the procedure of this name, or None."""
         return next((p for p in self.procedures if p.name == name), None)
 
     def quirk(self, kind: str) -> Quirk | None:
-        """The quirk of this kind, or None."""
+        """Return the quirk of this kind, or None."""
         return next((q for q in self.quirks if q.kind == kind), None)
 
     @model_validator(mode="after")
@@ -677,7 +678,7 @@ class Profile(Frozen):
 
 
 def _referenced_keys(profile: Profile) -> list[str]:
-    """Every parameter key that faults, procedures, tables and signals refer to."""
+    """Return every parameter key that faults, procedures, tables and signals refer to."""
     found: list[str] = []
 
     def walk(node: Any) -> None:

@@ -1,7 +1,7 @@
 """Unit codes of 60A8h to 60ABh: prefix << 24 | numerator << 16 | denominator << 8.
 
 Sources: CiA 402-2 objects 60A8h to 60ABh, ETG.6010 clause 5.9, notation and dimension indices of
-CiA 303-2. Pure; what a code means for an axis is decided by who knows its encoder and gear.
+CiA 303-2. Pure; the meaning of a code for an axis also depends on its encoder and gear.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from fractions import Fraction
 
 
 class Dimension(Enum):
-    """Dimension indices of CiA 303-2 that units of motion are made of."""
+    """Dimension indices of CiA 303-2 used in units of motion."""
 
     NONE = 0x00
     METRE = 0x01
@@ -44,7 +44,7 @@ _TURNS: dict[Dimension, float] = {
     Dimension.ARC_SECOND: 1.0 / 1_296_000.0,
 }
 _SECONDS = {Dimension.SECOND: 1.0, Dimension.MINUTE: 60.0, Dimension.HOUR: 3600.0}
-#: Powers of ten that CiA 303-2 has notation indices for.
+#: Powers of ten with a notation index in CiA 303-2.
 _EXPONENTS = range(-18, 19)
 
 
@@ -63,19 +63,19 @@ class SiUnit:
 
     @property
     def turns(self) -> float | None:
-        """Revolutions in one of the numerator, without the prefix; None where it is no angle."""
+        """Revolutions per numerator, without the prefix; None if it is not an angle."""
         return _TURNS.get(self.numerator)
 
     @property
     def seconds(self) -> float | None:
-        """Seconds in the denominator of a speed; None where it is no time."""
+        """Seconds in the denominator of a speed; None if it is not a time."""
         return _SECONDS.get(self.denominator)
 
     @property
     def square_seconds(self) -> float | None:
-        """Square seconds in the denominator of an acceleration; None where it is none.
+        """Square seconds in the denominator of an acceleration; None if it is not a time.
 
-        A single time there is read as that of a speed per second: rpm/s cannot be written else.
+        A plain time is interpreted as a speed per second: rpm/s cannot be written otherwise.
         """
         if self.denominator is Dimension.SQUARE_SECOND:
             return 1.0
@@ -88,7 +88,7 @@ class SiUnit:
 
     @property
     def name(self) -> str:
-        """As it is printed: ``rpm``, ``0.1 rpm``, ``inc/s``, ``0.1 °``, ``mrev/s``."""
+        """Printed form: ``rpm``, ``0.1 rpm``, ``inc/s``, ``0.1 °``, ``mrev/s``."""
         bare = _SYMBOLS[self.numerator]
         if (self.numerator, self.denominator) == (Dimension.REVOLUTION, Dimension.MINUTE):
             bare = "rpm"
@@ -103,7 +103,7 @@ class SiUnit:
 
 
 def decode_si_unit(code: int) -> SiUnit | None:
-    """The unit of a raw value of 60A8h to 60ABh; None where it is none of motion.
+    """Return the unit of a raw value of 60A8h to 60ABh; None if it is not a unit of motion.
 
     The prefix is a signed byte: FFh is 10⁻¹ (CiA 303-2 table 2). The lowest byte is reserved and 0.
     """

@@ -1,4 +1,4 @@
-"""What STOP writes to end a motion that a drive does by itself, as data of a profile."""
+"""What STOP writes to end a motion that a drive makes by itself, as data of a profile."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from profiles.record import Frozen
 
 
 class StopClear(Frozen):
-    """One object and the value at which it moves nothing.
+    """One object and the value at which it causes no motion.
 
     Without ``bits`` the whole value becomes ``raw``; with it only these bits become those of
-    ``raw``. With ``only`` it is written where the object has one of these values, as of an input
-    whose function jogs.
+    ``raw``. With ``only`` it is written only if the object has one of these values, for example an
+    input with the jog function.
     """
 
     key: str
@@ -26,11 +26,11 @@ class StopClear(Frozen):
     notes: str = ""
 
     def neutral(self, present: int) -> int | None:
-        """What is to be written over this value; None where it is harmless as it is."""
+        """Return the value to write over the present one; None if that is harmless."""
         if self.only and present not in self.only:
             return None
         if self.bits is None:
-            # A trigger that clears itself reads as neutral while its motion goes on.
+            # A trigger that clears itself reads as neutral while its motion continues.
             return self.raw
         wanted = present & ~self.bits | self.raw & self.bits
         return None if wanted == present else wanted

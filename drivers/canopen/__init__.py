@@ -1,1 +1,1 @@
-"""CANopen over python-can and canopen."""
+"""CANopen, with the libraries python-can and canopen."""

@@ -1,4 +1,4 @@
-"""Opening a CAN adapter by its URL, with python-can's errors in the project's words."""
+"""Opening a CAN adapter by its URL, with errors of python-can translated to `LinkLost`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from drivers.canopen.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 
-#: What python-can and the makers' libraries beneath it raise when an adapter is missing or dies.
-#: They agree on nothing narrower: ctypes bindings raise TypeError, AttributeError, NameError …
+#: Errors that python-can and the manufacturers' libraries below it raise when an adapter is missing
+#: or fails. They have no narrower base: ctypes bindings raise TypeError, AttributeError, NameError
+#: …
 ADAPTER_ERRORS = (Exception,)
 
 
@@ -21,8 +22,8 @@ def open_bus(url: CanUrl) -> can.BusABC:
     """Open the adapter.
 
     Raises:
-        LinkLost: missing, not permitted, in use, or without its driver; the message says which.
-        OutOfRange: no adapter by its form, whoever made the ``url``.
+        LinkLost: missing, not permitted, in use, or without its driver; the message states which.
+        OutOfRange: the ``url`` names no adapter in an allowed form.
     """
     try:
         return _open(url)
@@ -35,7 +36,7 @@ def open_bus(url: CanUrl) -> can.BusABC:
 def _open(url: CanUrl) -> can.BusABC:
     require_channel(url.interface, url.channel)
     if url.interface == "slcan":
-        # python-can would open any URL that pyserial knows; a resolved device is none.
+        # python-can would open any URL that pyserial knows; a resolved device path is not a URL.
         return SlcanBus(
             serial_device(url.channel),
             tty_baudrate=url.tty_baudrate or 115200,
@@ -52,7 +53,7 @@ def _open(url: CanUrl) -> can.BusABC:
 
 
 def translate(url: CanUrl, error: BaseException) -> LinkLost:
-    """The adapter's error as LinkLost, with a remedy."""
+    """Translate the adapter's error to LinkLost, with a remedy."""
     code = _errno(error)
     text = str(error)
     name = f"{url.interface} {url.channel}"
@@ -84,7 +85,7 @@ def translate(url: CanUrl, error: BaseException) -> LinkLost:
 
 
 def _errno(error: BaseException | None) -> int | None:
-    """The system's error number from anywhere in the chain: python-can wraps it."""
+    """Return the system's error number from anywhere in the chain: python-can wraps it."""
     while error is not None:
         for value in (getattr(error, "errno", None), getattr(error, "error_code", None)):
             if isinstance(value, int):

@@ -12,7 +12,7 @@ from drivers.texts.message import text
 
 def _require_place(place: str) -> None:
     interface, _, channel = place.partition("/")
-    # What else can be wrong with it, the CANopen link says (`parse_canopen_url`).
+    # Any other error in it is reported by the CANopen link (`parse_canopen_url`).
     if interface in CAN_INTERFACES and channel:
         require_channel(interface, unquote(channel))
 

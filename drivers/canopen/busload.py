@@ -1,7 +1,7 @@
-"""How full a SYNC cycle makes the bus. Pure.
+"""Bus load of a SYNC cycle. Pure.
 
-The load is worst case (most stuff bits), so that what is accepted here also works with the
-worst data. Above `LIMIT` nothing is left for SDO, heartbeats and repeated frames.
+The load is the worst case (most stuff bits), so that an accepted cycle also works with the worst
+data. Above `LIMIT` no room is left for SDO, heartbeats and repeated frames.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ LIMIT = 0.80
 
 @dataclass(frozen=True, slots=True)
 class BusLoad:
-    """``fraction`` of the bit rate used by one cycle's frames."""
+    """``fraction`` is the share of the bit rate used by the frames of one cycle."""
 
     fraction: float
     bits_per_cycle: int
     shortest_cycle_s: float
-    """The shortest cycle with which these frames stay within the limit."""
+    """Shortest cycle with which these frames stay within the limit."""
 
 
 def bus_load(pdo_bytes: Sequence[int], cycle_s: float, bitrate: int) -> BusLoad:
-    """Load of one SYNC (without counter) and PDOs of these lengths in bytes, every ``cycle_s``."""
+    """Return the load of a SYNC (without counter) and PDOs of these lengths, every ``cycle_s``."""
     bits = worst_case_bits(0) + sum(worst_case_bits(length) for length in pdo_bytes)
     return BusLoad(bits / (cycle_s * bitrate), bits, bits / (LIMIT * bitrate))
 
 
 def require_room(pdo_bytes: Sequence[int], cycle_s: float, bitrate: int) -> BusLoad:
-    """The load, if the bus can carry it.
+    """Return the load if the bus can carry it.
 
     Raises:
-        NotAllowed: above 80 %; the message names the shortest cycle that would do.
+        NotAllowed: above 80 %; the message states the shortest possible cycle.
     """
     load = bus_load(pdo_bytes, cycle_s, bitrate)
     if load.fraction > LIMIT:

@@ -1,10 +1,9 @@
-"""One node's SDO channel: one transfer at a time, and never a late answer for a new one.
+"""SDO channel of one node: one transfer at a time, safe against late answers.
 
-An SDO answer carries the object it belongs to but no number of the request. After a time-out
-the answer may therefore still come and would fit the next read of the same object. So the
-channel remembers that something is unanswered, and before the next transfer asks for an object
-that is *not* among the unanswered ones. A server works in order: once that answer is there,
-everything older has come and is thrown away.
+An SDO answer contains its object but no number of the request. After a time-out the answer may
+therefore still come and would match the next read of the same object. So the channel records
+unanswered requests, and before the next transfer reads an object that is *not* among them. A server
+works in order: once that answer has arrived, all older answers have arrived and been discarded.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from drivers.errors import DriveError, LinkTimeout, NotAsked, Rejected
 T = TypeVar("T")
 
 Send = Callable[[bytes], None]
-"""Put one request frame on the bus; raises LinkLost."""
+"""Sends one request frame; raises LinkLost."""
 
 _SILENT_REMEDY = (
     "check that the drive is powered, its number and the bit rate, the wiring and the "
@@ -32,19 +31,19 @@ _PROBE = b"\x40\x00\x10\x00" + bytes(4)
 """Read 1000h, which every CANopen device has (CiA 301 clause 7.5.2.1)."""
 
 _BLOCK_ABOVE = 127 * 7
-"""Bytes of one full block: below, segments take hardly longer."""
+"""Bytes of one full block: below this, segments take hardly longer."""
 
 _BARRIERS = ((0x1000, 0), (0x1001, 0), (0x1018, 1), (0x1018, 2), (0x1018, 3), (0x1018, 4))
 
 
 class _BlockUnanswered(LinkTimeout):
-    """A node without block transfer that ignores the request instead of refusing it."""
+    """A node without block transfer ignores the request instead of refusing it."""
 
 
 class SdoChannel:
-    """Runs transfers with one node. `run` may be called from any thread; it waits its turn.
+    """Runs transfers with one node. `run` may be called from any thread and waits for its turn.
 
-    Counters are plain integers, written by one thread at a time and read by anybody.
+    Counters are plain integers, written by one thread at a time and readable from any thread.
     """
 
     def __init__(self, node: int, send: Send, clock: Callable[[], float] = time.monotonic) -> None:
@@ -53,7 +52,7 @@ class SdoChannel:
         self.timeouts = 0
         self.late_answers = 0
         self.strays = 0
-        """Answers that nobody asked for and no time-out explains: a second node or master."""
+        """Answers without a request or an earlier time-out: a second node or master on the bus."""
         self.round_trip_s: float | None = None
         self.no_block_transfer = False
         self._send = send
@@ -64,22 +63,22 @@ class SdoChannel:
         self._tag = 0
 
     def deliver(self, frame: bytes) -> None:
-        """An answer frame of this node came (called by the receiving thread)."""
+        """Take an answer frame of this node (called by the receiving thread)."""
         self._answers.put(frame)
 
     def fail(self, error: DriveError) -> None:
-        """The bus is gone: end a waiting transfer at once (called by the receiving thread)."""
+        """End a waiting transfer at once, as the bus is gone (called by the receiving thread)."""
         self._answers.put(error)
 
     def run(self, transfer: sdo.Transfer[T], timeout_s: float, at_any_rate: bytes = b"") -> T:
         """Run one transfer to its end.
 
-        The frame ``at_any_rate`` (a stop) is sent where the transfer cannot even begin: a node
-        that does not answer may hear all the same. The error is raised then too.
+        The frame ``at_any_rate`` (a stop) is sent even if the transfer cannot start: a node that
+        does not answer may still receive it. The error is raised nevertheless.
 
         Raises:
             LinkTimeout: no answer within ``timeout_s`` of a request; the server was sent an abort.
-                NotAsked where it had not answered before either; then nothing was asked.
+                NotAsked if it had not answered before either; then nothing was requested.
             LinkLost: the bus went down meanwhile.
             Rejected, ProtocolError: see `drivers.canopen.sdo`.
         """
@@ -153,7 +152,7 @@ class SdoChannel:
         )
 
     def _wait_out_late_answers(self, timeout_s: float) -> None:
-        """Ask for another object until *its* answer is there; see the module's docstring."""
+        """Read another object until *its* answer arrives; see the module docstring."""
         index, subindex = self._next_barrier()
         mux = sdo.multiplexer(index, subindex)
         exchange = sdo.Exchange((b"\x40" + mux + bytes(4),), mux)
@@ -167,7 +166,8 @@ class SdoChannel:
                 self._still_silent(mux, timeout_s)
             if isinstance(answer, DriveError):
                 raise answer
-            # An abort without an object could belong to what timed out: only the full one counts.
+            # An abort without an object could belong to the request that timed out, so it does not
+            # count.
             if len(answer) == 8 and answer[1:4] == mux and answer[0] & 0xE0 in (0x40, 0x80):
                 break
             self.late_answers += 1
@@ -175,7 +175,7 @@ class SdoChannel:
         self._end_segments([answer])
 
     def _end_segments(self, answers: Sequence[bytes]) -> None:
-        """Abort what these answers to a read began: a segmented transfer would stay open."""
+        """Abort a segmented transfer that these answers to a read began; it would stay open."""
         for answer in answers:
             if answer[0] & 0xE0 == 0x40 and not answer[0] & 0x02:
                 self._send(sdo.abort_frame(answer[1:4], sdo.ABORT_GENERAL))
@@ -194,7 +194,7 @@ class SdoChannel:
 
     def _candidates(self) -> Iterator[tuple[int, int]]:
         yield from _BARRIERS
-        # The refusal of a subindex that does not exist names it too, so it serves as a mark.
+        # The refusal of a missing subindex contains that subindex, so it can serve as the barrier.
         for _ in range(255):
             self._tag = self._tag % 255 + 1
             yield 0x1000, self._tag
@@ -205,7 +205,7 @@ class SdoChannel:
                 self.strays += 1
 
     def read(self, index: int, subindex: int, timeout_s: float) -> bytes:
-        """Read an object; long ones by block transfer where the node offers it."""
+        """Read an object; long ones by block transfer if the node supports it."""
         if not self.no_block_transfer:
             try:
                 return self.run(sdo.upload(index, subindex, _BLOCK_ABOVE), timeout_s)
@@ -222,12 +222,13 @@ class SdoChannel:
         *,
         at_any_rate: bool = False,
     ) -> None:
-        """Write an object; long ones by block transfer where the node offers it.
+        """Write an object; long ones by block transfer if the node supports it.
 
         ``at_any_rate`` as in `run`, for data of up to four bytes.
         """
         if len(data) > _BLOCK_ABOVE and not self.no_block_transfer:
-            # Both refusals come before any data went, so segments afterwards do not write twice.
+            # Both refusals come before any data were sent, so the segments afterwards do not write
+            # twice.
             try:
                 return self.run(sdo.block_download(index, subindex, data), timeout_s)
             except _BlockUnanswered:
@@ -240,7 +241,7 @@ class SdoChannel:
         return self.run(sdo.download(index, subindex, data), timeout_s, stop)
 
     def begin_probe(self) -> None:
-        """Take the node's turn and ask for its device type; `end_probe` must follow."""
+        """Occupy the node and request its device type; `end_probe` must follow."""
         self._turn.acquire()
         self._discard_strays()
         try:
@@ -250,7 +251,7 @@ class SdoChannel:
             raise
 
     def end_probe(self) -> list[bytes]:
-        """All answers to the probe; more than one means more than one node. Gives the turn back."""
+        """Return all answers to the probe (more than one: several nodes) and release the node."""
         answers: list[bytes] = []
         try:
             while True:

@@ -1,8 +1,8 @@
 """SYNC-driven process data: `drivers.link.Cyclic` on a CAN bus.
 
-Per cycle: SYNC, then the outputs for the next SYNC; the inputs that SYNC called for arrive
-meanwhile and form one sample. The set-up of the drives is undone by `stop`. The loop owns the
-control word of every axis that it has outputs for (`drivers.link.OwnsPowerState`).
+Per cycle: SYNC, then the outputs for the next SYNC; the inputs triggered by SYNC arrive meanwhile
+and form one sample. `stop` restores the previous settings of the drives. The loop owns the control
+word of every axis for which it has outputs (`drivers.link.OwnsPowerState`).
 """
 
 from __future__ import annotations
@@ -62,9 +62,9 @@ class CanopenCyclic:
         self._fixed_pdos: dict[int, tuple[FixedPdo, ...]] = {}
         self.dc = None
         self.left_over: tuple[tuple[CyclicSignal, Text], ...] = ()
-        """Signals of the last `configure` that are not exchanged, and why."""
+        """Signals of the last `configure` that are not exchanged, each with the reason."""
         self.unguarded: frozenset[int] = frozenset()
-        """Stations with outputs whose drive offers no watchdog (1016h) against our silence."""
+        """Stations with outputs whose drive has no heartbeat consumer (1016h)."""
         self._port = port
         self._settings = settings
         self._read = read
@@ -82,45 +82,45 @@ class CanopenCyclic:
 
     @property
     def power(self) -> CanopenCyclic:
-        """Its loop writes the control words."""
+        """The exchange itself: its loop writes the control words."""
         return self
 
     @property
     def pairs(self) -> None:
-        """Its loop moves each axis by itself."""
+        """None: the loop moves each axis separately."""
         return None
 
     @property
     def speeds(self) -> CanopenCyclic:
-        """Drives without a cyclic mode are given speeds in Profile velocity."""
+        """The exchange itself: it can send speeds to drives without a cyclic mode."""
         return self
 
     @property
     def trouble(self) -> Text | None:
-        """None: an exchange that broke off is not set up again by itself."""
+        """None: an exchange that broke off is not restarted automatically."""
         return None
 
     def watch_nodes_by(self, heard: Callable[[int], bool]) -> None:
-        """How to determine whether a node of this number is on the bus."""
+        """Set the function that returns whether a node of this number is on the bus."""
         self._heard = heard
 
     def send_events_to(self, send: Callable[[LinkEvent], None]) -> None:
-        """Where events of the loop go (any thread)."""
+        """Set the receiver of the loop's events (called on any thread)."""
         self._send_event = send
 
     def set_modes(self, station: int, modes: Sequence[int]) -> None:
-        """Which modes the drive has: without CSP, CSV or CST its commands stay with SDO."""
+        """Set the drive's modes: without CSP, CSV or CST its commands are sent by SDO."""
         if {8, 9, 10} & set(modes):
             self._without_cyclic_modes.discard(station)
         else:
             self._without_cyclic_modes.add(station)
 
     def set_fixed_pdos(self, station: int, fixed: Sequence[FixedPdo]) -> None:
-        """PDOs of the drive that it does not let be mapped again."""
+        """Set the PDOs of the drive that cannot be mapped again."""
         self._fixed_pdos[station] = tuple(fixed)
 
     def speak(self, station: int, dialect: Dialect) -> None:
-        """How the drive takes its commands; by SDO all the same where it has no cyclic mode."""
+        """Set the dialect of the drive's commands; without a cyclic mode they still use SDO."""
         self._dialects[station] = dialect
 
     def take_speeds(self, station: int, by_profile_velocity: bool) -> None:
@@ -132,7 +132,7 @@ class CanopenCyclic:
         return self._dialects.get(station, Dialect())
 
     def _by_sdo(self, station: int) -> bool:
-        """Whether the commands of this drive stay out of the process data."""
+        """Return whether the commands of this drive are not sent in the process data."""
         by_speed = self._dialect(station).speed_mode is Mode.PV
         return station in self._without_cyclic_modes and not by_speed
 
@@ -142,8 +142,8 @@ class CanopenCyclic:
         """Plan the PDOs and return the signals that fit; nothing is written before `start`.
 
         Raises:
-            NotAllowed: cycle below 1 ms, bus load above 80 % even with the most important
-                signals only, or still running.
+            NotAllowed: cycle below 1 ms, bus load above 80 % even with only the most important
+                signals, or still running.
         """
         if self._loop is not None:
             raise NotAllowed("canopen.cyclic-exchange-running")
@@ -166,11 +166,11 @@ class CanopenCyclic:
         return tuple(s for s in (*inputs, *outputs) if s not in left)
 
     async def start(self) -> None:
-        """Map the PDOs, set up the drives' watchdogs, go to Operational and run.
+        """Map the PDOs, set up the drives' watchdogs, go to Operational and start the loop.
 
         Raises:
-            NotAllowed: nothing configured, or a drive does not let itself be mapped.
-            LinkTimeout, LinkLost: as for any write; what was changed has been restored.
+            NotAllowed: nothing is configured, or a drive refuses the mapping.
+            LinkTimeout, LinkLost: as for any write; all changes have been undone.
         """
         configured = self._configured
         if configured is None:
@@ -201,13 +201,13 @@ class CanopenCyclic:
         await self._in_worker(partial(self._nmt, frames.NMT_START, images.stations))
 
     async def stop(self) -> None:
-        """Ramp down whatever moves, leave Operational and put the drives' PDOs back."""
+        """Ramp down every moving axis, leave Operational and restore the drives' PDOs."""
         loop = self._loop
         if loop is None:
             return
         try:
             await self._in_worker(loop.halt_and_wait)
-            # Before the silence: else the drives' own watchdog would report a fault.
+            # Before our heartbeat ends: otherwise the drives' own watchdog would report a fault.
             await self._in_worker(self._setup.unguard)
             stations = loop.images.stations
             await self._in_worker(partial(self._nmt, frames.NMT_PREOPERATIONAL, stations))
@@ -217,7 +217,7 @@ class CanopenCyclic:
             await self._in_worker(self._setup.undo)
 
     async def shut_down(self) -> None:
-        """`stop`, whatever state the bus is in."""
+        """Run `stop` in any state of the bus; an error is only reported as an event."""
         try:
             await self.stop()
         except DriveError as error:
@@ -226,12 +226,12 @@ class CanopenCyclic:
             )
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
-        """Play trajectories in step; returns the cycle counter of the first value.
+        """Play trajectories in synchronism; return the cycle number of the first value.
 
         Raises:
             NotAllowed: not running or not enabled, a target that is not a mapped output, a jump at
                 the beginning, or an envelope limit whose signal is not among the inputs.
-            OutOfRange: a value does not fit its target, or offsets are missing.
+            OutOfRange: a value does not fit its target, or the number of offsets differs.
         """
         loop = self._require_running()
         for trajectory in trajectories:
@@ -243,7 +243,7 @@ class CanopenCyclic:
         return loop.play(motions)
 
     async def _until_seen_enabled(self, loop: SyncLoop, station: int) -> None:
-        """An SDO may report Operation enabled a cycle or two before the process data do."""
+        """Wait until the process data show Operation enabled, which an SDO may report earlier."""
         axis = loop.images.axes[station]
         waited_s = 0.0
         enabled = State.OPERATION_ENABLED
@@ -252,14 +252,14 @@ class CanopenCyclic:
             waited_s += loop.cycle_s
 
     async def renew(self, station: int) -> None:
-        """Extend the life of the setpoints of ``station``."""
+        """Extend the validity of the setpoints of ``station``."""
         self._require_running().axis(station, AxisLoop.renew)
 
     async def halt(self, station: int | None = None) -> None:
         """Brake now and leave Operation enabled; setpoints end.
 
         Raises:
-            LinkLost: nobody receives it. The setpoints end all the same, for when the bus is back.
+            LinkLost: the bus is lost. The setpoints end nevertheless, for when the bus is back.
         """
         if self._loop is not None:
             self._loop.halt(station, Halted(HaltCause.COMMANDED))
@@ -281,7 +281,7 @@ class CanopenCyclic:
         return leave
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """Raw values of the last cycle, see `drivers.link.Cyclic`."""
+        """Return the raw values of the last cycle, see `drivers.link.Cyclic`."""
         reported = {} if self._loop is None else self._loop.newest(within_s)
         return {channel: reported[channel] for channel in channels if channel in reported}
 
@@ -289,15 +289,15 @@ class CanopenCyclic:
 
     @property
     def running(self) -> bool:
-        """Whether process data are exchanged."""
+        """Whether process data are being exchanged."""
         return self._loop is not None and self._loop.running
 
     def owns(self, station: int) -> bool:
-        """Whether the loop writes the control word of ``station``."""
+        """Return whether the loop writes the control word of ``station``."""
         return self._loop is not None and station in self._loop.images.axes
 
     async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
-        """Head for a power state; the axis brakes before it leaves Operation enabled.
+        """Request a power state; the axis brakes before it leaves Operation enabled.
 
         Raises:
             NotAllowed: the drive has a fault, moves, or its control word is not mapped; or it was
@@ -323,7 +323,7 @@ class CanopenCyclic:
         self._require_running().axis(station, AxisLoop.reset_fault)
 
     def axis_state(self, station: int) -> LoopState:
-        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+        """Return power state, phase of the setpoints, and why the last motion was halted."""
         axis = None if self._loop is None else self._loop.images.axes.get(station)
         if axis is None:
             return LoopState(State.UNKNOWN.value, Phase.IDLE.value, None)
@@ -332,7 +332,7 @@ class CanopenCyclic:
     # For the link
 
     def statistics(self) -> dict[str, float | int | str]:
-        """Cycles, lost samples and SYNC lateness in µs, for link quality."""
+        """Return cycles, lost samples and SYNC lateness [µs], for the link quality."""
         figures: dict[str, float | int | str] = {}
         if self.load is not None:
             figures["cyclic_bus_load_percent"] = round(100 * self.load.fraction, 1)
@@ -346,21 +346,21 @@ class CanopenCyclic:
             self._loop.forget_arrivals()
 
     def arrivals(self, station: int) -> tuple[int, tuple[int, ...]]:
-        """See `SyncLoop.arrivals`; nothing while the exchange does not run."""
+        """See `SyncLoop.arrivals`; empty while the exchange does not run."""
         return (0, ()) if self._loop is None else self._loop.arrivals(station)
 
     def take(self, frame: Frame) -> bool:
-        """Take a received frame if it is one of our input PDOs (receiving thread)."""
+        """Take a received frame if it is one of the input PDOs (receiving thread)."""
         loop = self._loop
         return loop is not None and loop.take(frame)
 
     def event(self, event: LinkEvent) -> None:
-        """A loss or restart ends setpoints: they must not go on by themselves afterwards."""
+        """End setpoints on a loss or restart: they must not continue afterwards."""
         if self._loop is None:
             return
         own = self._settings.own_id
         if (event.kind, event.station) == ("boot", own) and self._loop.images.outputs:
-            # From now on its heartbeat stands for ours: see `_require_own_number`.
+            # From now on its heartbeat could be taken for ours: see `_require_own_number`.
             twice = text("event.own-number-started", node=own)
             self._loop.halt(None, Halted(HaltCause.LOST, note=twice))
         elif event.kind in ("lost", "boot") or (event.kind == "fault" and event.station is None):
@@ -369,12 +369,12 @@ class CanopenCyclic:
             self._loop.halt(event.station, Halted(HaltCause.LOST, note=event.text))
 
     def drives(self, station: int, index: int, subindex: int) -> bool:
-        """Whether this object is written by our PDOs each cycle."""
+        """Return whether this object is written by our PDOs in each cycle."""
         loop = self._loop
         return loop is not None and (station, index, subindex) in loop.images.outputs
 
     def put(self, station: int, index: int, subindex: int, data: bytes) -> None:
-        """Send ``data`` with the PDOs from now on; returns when it is on the bus. Blocks.
+        """Send ``data`` with the PDOs from now on; return when they are on the bus. Blocks.
 
         Raises:
             NotAllowed: the loop itself writes this object.
@@ -414,13 +414,13 @@ class CanopenCyclic:
             self._port.send(Frame(frames.NMT, bytes([command, station])))
 
     def _require_own_number(self) -> None:
-        """Raises NotAllowed where a node's heartbeat could stand for ours."""
+        """Raise NotAllowed if the heartbeat of a node could be taken for ours."""
         own = self._settings.own_id
         if self._heard(own):
             raise NotAllowed("canopen.node-bus-number-under", value=own)
 
     def _prepare(self, configured: _Configured, images: Images) -> None:
-        """Map, guard, and begin with the drives' present values, so nothing changes at first."""
+        """Map and guard the drives; start from their present values, so that nothing changes."""
         if images.outputs:
             self._require_own_number()
         self._nmt(frames.NMT_PREOPERATIONAL, images.stations)

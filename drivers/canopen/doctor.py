@@ -1,7 +1,7 @@
-"""Reading of a node and its bus whatever shows why it does not reach Operational. Blocking.
+"""Reading of everything in a node and its bus that shows why it is not Operational. Blocking.
 
-Asks and listens only: reads of objects, and one request of node guarding where that starts no
-life guarding. Source: CiA 301 v4.2.0 clauses 7.2.8.2.2 (error control) and 7.5.2 (objects).
+Only reads: reads of objects, received frames, and one request of node guarding if that does not
+start life guarding. Source: CiA 301 v4.2.0 clauses 7.2.8.2.2 (error control) and 7.5.2 (objects).
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ class Examiner:
         self._cyclic = cyclic
 
     def known(self) -> list[int]:
-        """Nodes that were heard or are in use."""
+        """Return the nodes that were received or are in use."""
         with self._lock:
             return sorted(node for node in self._watch.nodes if self._watch.is_there(node))
 
     def examine(
         self, node: int, profile: Profile | None, refusal: DriveError | None
     ) -> CanEvidence:
-        """Facts of ``node``; 0 is the bus alone. Takes one to five seconds."""
+        """Collect the facts of ``node``; 0 is the bus alone. Takes one to five seconds."""
         before, begin_s = self._counts(), time.monotonic()
         facts: dict[str, Any] = {"node": node, "answers": 0, "own_id": self._settings.own_id}
         facts |= {"timeout_s": self._settings.timeout_s} | _refused(refusal)
@@ -94,7 +94,7 @@ class Examiner:
     def _settings(self) -> CanUrl:
         return self._port.url
 
-    # What is asked
+    # Requests
 
     def _ask(self, node: int, facts: dict[str, Any]) -> None:
         answers: dict[int, list[bytes]] = {}
@@ -124,7 +124,7 @@ class Examiner:
         self._ask_state(node)
 
     def _same_product(self, others: tuple[int, ...], facts: dict[str, Any]) -> tuple[int, ...]:
-        """Nodes with the identity of the profile, for one that does not answer."""
+        """Return the nodes with the identity of the profile, for a node that does not answer."""
         vendor, product = facts.get("known_vendor"), facts.get("known_product")
         if vendor is None or product is None:
             return ()
@@ -144,7 +144,7 @@ class Examiner:
         )
 
     def _sends(self, node: int) -> set[int]:
-        """Identifiers that a node sends with (CiA 301 clause 7.3.3, 1800h to 1803h)."""
+        """Return the identifiers with which a node sends (CiA 301 clause 7.3.3, 1800h to 1803h)."""
         found = {EMERGENCY + node, SDO_ANSWER + node, HEARTBEAT + node}
         for number in range(4):
             cob_id = self._number(node, 0x1800 + number, 1)
@@ -153,7 +153,7 @@ class Examiner:
         return found
 
     def _ask_state(self, node: int) -> None:
-        """Wait for a heartbeat; a node without one is asked by node guarding, where it may be."""
+        """Wait for a heartbeat, or request the state by node guarding where that is permitted."""
         period_ms = self._number(node, 0x1017, 0) or 0
         asked_s = time.monotonic()
         if period_ms:
@@ -161,9 +161,9 @@ class Examiner:
             self._until(lambda record: (record.last_heartbeat_s or 0) >= asked_s, node, limit_s)
             return
         if self._settings.guard_s > 0:
-            return  # the link asks by itself
-        # The first request would start life guarding where a node has it set up
-        # (clause 7.2.8.2.2).
+            return  # the link requests it regularly
+        # The first request would start life guarding in a node where it is set up (clause
+        # 7.2.8.2.2).
         if self._number(node, 0x100C, 0) and self._number(node, 0x100D, 0):
             return
         with self._lock:
@@ -190,10 +190,10 @@ class Examiner:
             return None
         return int.from_bytes(data, "little")
 
-    # What is heard
+    # Received frames
 
     def _listen(self, begin_s: float) -> None:
-        """Give the bus a moment: error frames and process data come by themselves."""
+        """Wait for error frames and process data, which arrive without a request."""
         time.sleep(max(begin_s + _LISTEN_S - time.monotonic(), 0.0))
 
     def _heard(self, record: NodeRecord | None, facts: dict[str, Any]) -> dict[str, Any]:
@@ -213,7 +213,7 @@ class Examiner:
             "toggle_repeated": _recent(record.toggle_repeated_s, now_s),
             "emergency": code,
             # Bit 0 of 1001h is set as long as there is any error (CiA 301 clause 7.5.2.2): some
-            # drives never take an emergency back by code 0.
+            # drives never withdraw an emergency by code 0.
             "emergency_open": bool(code) and facts.get("error_register") != 0,
             "foreign_master": _recent(record.foreign_master_s, now_s),
         }
@@ -248,7 +248,7 @@ def _recent(at_s: float | None, now_s: float) -> bool:
 
 
 def _refused(refusal: DriveError | None) -> dict[str, Any]:
-    """The refusal with what led to it: an undo that failed as well must not hide the first one."""
+    """Return the refusal with its causes: a failed undo must not hide the first error."""
     if refusal is None:
         return {}
     chain = list(_chain(refusal))

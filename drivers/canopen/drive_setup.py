@@ -1,4 +1,4 @@
-"""Preparing drives for process data, and the way back. Blocking; runs on a worker thread."""
+"""Set-up of drives for process data, and its undo. Blocking; runs on a worker thread."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ WATCHDOG_MS = 200
 _PDO_FLAGS = 0x60000000
 
 ReadObject = Callable[[int, int, int], bytes]
-"""Read (station, index, subindex), blocking."""
+"""Reads (station, index, subindex), blocking."""
 
 WriteObject = Callable[[int, int, int, bytes], None]
-"""Write (station, index, subindex, data), blocking."""
+"""Writes (station, index, subindex, data), blocking."""
 
 
 class DriveSetup:
-    """Changes drives and remembers how to undo it."""
+    """Changes drives and records how to undo the changes."""
 
     def __init__(self, read: ReadObject, write: WriteObject, own_id: int) -> None:
         self._read = read
@@ -29,10 +29,10 @@ class DriveSetup:
         self._undo: list[tuple[int, SdoWrite]] = []
 
     def map_pdos(self, pdos: Sequence[PdoPlan]) -> None:
-        """Map these PDOs, and silence the other three or four input PDOs of their stations.
+        """Map these PDOs, and disable the other input PDOs (of four) of their stations.
 
         Raises:
-            NotAllowed: a drive does not let a signal be mapped; the message names it.
+            NotAllowed: a drive refuses the mapping of a signal; the message names it.
         """
         for station in sorted({p.station for p in pdos}):
             used = {p.number for p in pdos if (p.station, p.direction) == (station, "tx")}
@@ -46,7 +46,7 @@ class DriveSetup:
                 self._take_over(pdo, pdo.fixed)
 
     def guard(self, station: int) -> bool:
-        """Let the drive watch our heartbeat; False where it has no consumer (1016h)."""
+        """Make the drive monitor our heartbeat; return False if it has no consumer (1016h)."""
         value = (self._own_id << 16 | WATCHDOG_MS).to_bytes(4, "little")
         try:
             self._change(station, SdoWrite(0x1016, 1, value))
@@ -55,13 +55,13 @@ class DriveSetup:
         return self._read(station, 0x1016, 1) == value
 
     def interpolate(self, station: int, cycle_s: float) -> None:
-        """Write to a drive that interpolates between setpoints how far apart they come (60C2h)."""
+        """Write the time between setpoints (60C2h) to a drive that interpolates between them."""
         try:
             value, exponent = interpolation_period(round(cycle_s * 1e9))
             self._change(station, SdoWrite(0x60C2, 1, bytes([value])))
             self._change(station, SdoWrite(0x60C2, 2, exponent.to_bytes(1, "little", signed=True)))
         except (Rejected, NotAllowed):
-            return  # it does not interpolate, or not over this time: then it keeps its own
+            return  # no interpolation, or not over this time: the drive keeps its own
 
     def unguard(self) -> None:
         """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
@@ -70,7 +70,7 @@ class DriveSetup:
         self._put_back(mine)
 
     def undo(self) -> None:
-        """Put everything back.
+        """Restore all settings.
 
         Raises:
             NotAllowed: something could not be restored; the message lists it.
@@ -84,7 +84,7 @@ class DriveSetup:
         try:
             self._write(station, write.index, write.subindex, write.data)
         except Rejected:
-            self._undo.pop()  # it is as it was
+            self._undo.pop()  # unchanged
             raise
 
     def _silence(self, station: int, communication: int) -> None:
@@ -94,7 +94,7 @@ class DriveSetup:
                 data = (cob | INVALID).to_bytes(4, "little")
                 self._change(station, SdoWrite(communication, 1, data))
         except Rejected:
-            return  # a drive without this PDO has nothing to silence
+            return  # a drive without this PDO has nothing to disable
 
     def _map(self, pdo: PdoPlan) -> None:
         station = pdo.station
@@ -106,7 +106,7 @@ class DriveSetup:
                 self._write(station, write.index, write.subindex, write.data)
                 cleared = cleared or write.index == pdo.mapping
         except Rejected as refusal:
-            if not cleared:  # a fixed mapping is as it was, and would refuse to be restored too
+            if not cleared:  # a fixed mapping is unchanged, and would refuse to be restored
                 self._undo = [
                     (s, w) for s, w in self._undo if (s, w.index) != (station, pdo.mapping)
                 ]
@@ -122,10 +122,10 @@ class DriveSetup:
             ) from refusal
 
     def _take_over(self, pdo: PdoPlan, fixed: FixedPdo) -> None:
-        """Use a PDO as the drive has it; only identifier and kind may be changed.
+        """Use a PDO as the drive has it; only identifier and transmission type may be changed.
 
         Raises:
-            NotAllowed: it holds something else than its file says, or cannot be used with SYNC.
+            NotAllowed: its contents differ from its file, or it cannot be used with SYNC.
         """
         station = pdo.station
         held = self._held(station, pdo.mapping)
@@ -150,7 +150,7 @@ class DriveSetup:
             return
         closed = (cob | INVALID).to_bytes(4, "little")
         opens = self._tried(station, SdoWrite(pdo.communication, 1, closed))
-        # Outputs of another kind act as soon as they arrive; inputs would come when they like.
+        # Outputs of another type take effect on arrival; inputs would come at any time.
         needs_kind = kind != synchronous and pdo.direction == "tx"
         kept = self._tried(station, SdoWrite(pdo.communication, 2, synchronous))
         if opens:
@@ -176,7 +176,7 @@ class DriveSetup:
         ]
 
     def _tried(self, station: int, write: SdoWrite) -> bool:
-        """`_change`, and whether the drive took it."""
+        """Write as `_change`; return whether the drive accepted it."""
         try:
             self._change(station, write)
         except Rejected:
@@ -184,7 +184,7 @@ class DriveSetup:
         return True
 
     def _remember(self, pdo: PdoPlan, cob: bytes) -> None:
-        """The list is undone from its end: invalid first, then the mapping, then valid again."""
+        """Record the undo list, which runs from its end: invalid, then the mapping, then valid."""
         station = pdo.station
         kind = self._read(station, pdo.communication, 2)
         count = self._read(station, pdo.mapping, 0)
@@ -205,7 +205,7 @@ class DriveSetup:
         silent: set[int] = set()
         for station, write in reversed(undo):
             if station in silent:
-                continue  # asking a dead drive again and again only takes time
+                continue  # repeated requests to a drive that does not answer only take time
             try:
                 self._write(station, write.index, write.subindex, write.data)
             except LinkLost:

@@ -1,4 +1,4 @@
-"""PDOs whose contents the drive does not let be changed, as its profile describes them. Pure.
+"""PDOs whose contents cannot be changed, as the profile describes them. Pure.
 
 Source: CiA 301 v4.2.0 clauses 7.5.2.35 to 7.5.2.38: mapping objects may be read-only.
 """
@@ -19,7 +19,7 @@ Direction = Literal["rx", "tx"]
 
 @dataclass(frozen=True, slots=True)
 class FixedPdo:
-    """One PDO of one node: objects in their order (None: bytes that hold nothing) with sizes."""
+    """One PDO of one node: objects in their order (None: unused bytes) with sizes [bytes]."""
 
     direction: Direction
     number: int
@@ -28,12 +28,12 @@ class FixedPdo:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return sum(size for _, size in self.entries)
 
     @property
     def words(self) -> tuple[int | None, ...]:
-        """Mapping entries as 16xxh and 1Axxh hold them; None where any that is as long will do."""
+        """Mapping entries as in 16xxh and 1Axxh; None for unused bytes (only the length counts)."""
         return tuple(
             None
             if address is None
@@ -42,7 +42,7 @@ class FixedPdo:
         )
 
     def starts(self) -> Iterator[tuple[Address, int]]:
-        """Each object with the byte at which it begins."""
+        """Iterate over the objects with their byte offsets."""
         start = 0
         for address, size in self.entries:
             if address is not None:
@@ -51,7 +51,7 @@ class FixedPdo:
 
 
 def fixed_pdos(profile: Profile, station: int) -> tuple[FixedPdo, ...]:
-    """The fixed PDOs of a node, of directions in which no PDO can be mapped again."""
+    """Return the fixed PDOs of a node, for directions in which no PDO can be mapped again."""
     sets = profile.pdo.sets if profile.pdo is not None else ()
     open_ways = {each.direction for each in sets if not each.fixed}
     found = (
@@ -63,7 +63,7 @@ def fixed_pdos(profile: Profile, station: int) -> tuple[FixedPdo, ...]:
 
 
 def _fixed(each: PdoSet, profile: Profile, station: int) -> FixedPdo | None:
-    """None where bits are mapped that are no whole bytes, or the identifier is not known."""
+    """Return None if mapped bits are not whole bytes, or if the identifier is unknown."""
     number = each.index - (0x1600 if each.direction == "rx" else 0x1A00)
     bases = RPDO if each.direction == "rx" else TPDO
     if each.identifier is not None:
@@ -89,9 +89,10 @@ def _fixed(each: PdoSet, profile: Profile, station: int) -> FixedPdo | None:
 def chosen(
     fixed: Sequence[FixedPdo], wanted: Sequence[CyclicSignal]
 ) -> tuple[list[tuple[FixedPdo, tuple[CyclicSignal, ...]]], list[CyclicSignal]]:
-    """PDOs that hold these signals, each with its own; and the signals that none holds.
+    """Choose the PDOs that contain these signals, each with its own; and the signals left over.
 
-    What an output PDO holds next to them is a signal as well: the drive takes it in every cycle.
+    The other objects of an output PDO become signals as well, as the drive accepts them in every
+    cycle.
     """
     left = list(wanted)
     found = []
@@ -113,7 +114,7 @@ def chosen(
 
 
 def _signal_at(known: CyclicSignal, address: Address) -> CyclicSignal:
-    """A signal of the same drive, named like the others."""
+    """Return a signal of the same drive, named like the others."""
     drive, slash, _ = known.channel.rpartition("/")
     key = f"{address.index:04X}:{address.subindex:02X}"
     return CyclicSignal(known.station, address, f"{drive}{slash}{key}")

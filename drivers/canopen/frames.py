@@ -36,7 +36,7 @@ class Frame(NamedTuple):
 
 
 def worst_case_bits(data_bytes: int) -> int:
-    """Bits that a base frame occupies with the most stuff bits possible.
+    """Return the bits that a base frame occupies with the most stuff bits possible.
 
     34 + 8n bits are subject to stuffing (one more after every four at worst); 10 more (CRC
     delimiter, acknowledge, end of frame) and the 3 bits of interframe space are not.
@@ -46,7 +46,7 @@ def worst_case_bits(data_bytes: int) -> int:
 
 
 def exact_bits(frame: Frame) -> int:
-    """Bits that this very frame occupies, with the stuff bits its contents need.
+    """Return the bits that this frame occupies, with the stuff bits of its contents.
 
     Source: ISO 11898-1 clauses 10.4.2 (frame format), 10.5 (stuffing) and 10.4.2.6 (CRC).
     """

@@ -1,4 +1,4 @@
-"""Where each signal sits in the PDOs, and each station's axis in the cyclic loop. Pure."""
+"""Position of each signal in the PDOs, and the axis loop of each station. Pure."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Key = tuple[int, int, int]
 
 CONTROL_WORD = 0x6040
 _RATES = (0x60FF, 0x6071, 0x60B1, 0x60B2)
-"""Targets and offsets of speed and torque."""
+"""Targets and offsets of velocity and torque."""
 
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One signal: its PDO, where it starts there, and its column among inputs or outputs."""
+    """One signal: its PDO, its byte offset there, and its column among inputs or outputs."""
 
     cob_id: int
     start: int
@@ -32,7 +32,7 @@ class Slot:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return size_of(self.type) or 0
 
 
@@ -47,11 +47,11 @@ class Images:
         dialects: Mapping[int, cia402.Dialect] | None = None,
     ) -> None:
         self.channels: tuple[str, ...] = ()
-        """Names of the inputs, and after them of the outputs."""
+        """Names of the inputs, followed by those of the outputs."""
         self.inputs: dict[Key, Slot] = {}
         self.outputs: dict[Key, Slot] = {}
         self.frames: dict[int, bytearray] = {}
-        """Bytes of each output PDO by its identifier."""
+        """Contents of each output PDO by its identifier."""
         self.lengths: dict[int, int] = {}
         """Length of each input PDO by its identifier."""
         self.stations = sorted({p.station for p in pdos})
@@ -100,7 +100,7 @@ class Images:
         )
 
     def _objects(self, station: int) -> list[int]:
-        """Outputs that the axis may write: numbers without a subindex."""
+        """Return the outputs that the axis may write: integers at subindex 0."""
         return [
             index
             for (node, index, subindex), slot in self.outputs.items()
@@ -108,7 +108,7 @@ class Images:
         ]
 
     def set_output(self, key: Key, data: bytes) -> None:
-        """Change the bytes that go out."""
+        """Change the bytes of an output."""
         slot = self.outputs[key]
         self.frames[slot.cob_id][slot.start : slot.start + slot.size] = data
         axis = self.axes.get(key[0])
@@ -117,7 +117,7 @@ class Images:
             axis.outputs[self._objects(key[0]).index(key[1])] = int(value)
 
     def sent(self) -> list[int | float]:
-        """What the output PDOs say now, in the order of the outputs' names."""
+        """Return the present values of the output PDOs, in the order of the outputs' names."""
         values: list[int | float] = [0] * len(self.outputs)
         for slot in self.outputs.values():
             frame = self.frames[slot.cob_id]
@@ -126,7 +126,7 @@ class Images:
         return values
 
     def take(self, arrived: dict[int, bytes]) -> set[int]:
-        """Take over the input PDOs of one cycle; returns the stations that are complete."""
+        """Store the input PDOs of one cycle; return the stations that are complete."""
         missing: set[int] = set()
         for (station, _index, _subindex), slot in self.inputs.items():
             data = arrived.get(slot.cob_id)
@@ -138,17 +138,17 @@ class Images:
         return {s for s in self.stations if s not in missing}
 
     def pack_axis(self, station: int) -> None:
-        """The axis' outputs into the PDOs."""
+        """Write the axis outputs into the PDOs."""
         axis = self.axes[station]
         for value, index in zip(axis.outputs, self._objects(station), strict=True):
             slot = self.outputs[station, index, 0]
             self.frames[slot.cob_id][slot.start : slot.start + slot.size] = encode(slot.type, value)
 
     def neutralise(self, station: int, why: Halted) -> None:
-        """End everything of this station and make its outputs harmless.
+        """End all motion of this station and set harmless outputs.
 
-        Disabled, no speed, no torque; the position stays, as holding is what a position does. A
-        new loop replaces the old one, so nothing of its motion is left.
+        Disabled, no speed, no torque; the position setpoint remains, as it only holds the position.
+        A new axis loop replaces the old one, so that nothing of its motion remains.
         """
         for key, slot in self.outputs.items():
             if key[0] == station and key[1] == CONTROL_WORD:

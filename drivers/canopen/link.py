@@ -1,7 +1,7 @@
-"""CANopen as a `drivers.link.Link` on any adapter that python-can knows.
+"""CANopen as a `drivers.link.Link` on any adapter supported by python-can.
 
-Own SDO transfers instead of ``canopen.SdoClient``: that one has no lock and takes a late answer
-for the same object as the new one. See `drivers.canopen.channel` for how this is excluded here.
+SDO transfers are implemented here instead of using ``canopen.SdoClient``, which has no lock and
+takes a late answer for the same object as the new one. `drivers.canopen.channel` excludes this.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ T = TypeVar("T")
 _WRITE_TIMEOUT_S = 1.0
 _STORE_TIMEOUT_S = 10.0
 _STORE_INDICES = (0x1010, 0x1011)
-#: One for every node and one for the exchange: a silent node keeps nobody waiting but itself.
+#: One for every node and one for the exchange: a node that does not answer delays only itself.
 _WORKERS = 128
 
 
@@ -90,7 +90,7 @@ class CanopenLink:
             node: SdoChannel(node, self._request_sender(node)) for node in range(1, 128)
         }
         self._turns = {node: asyncio.Lock() for node in range(1, 128)}
-        #: Writes that wait for their turn: one may be the stop, so batches of reads yield.
+        #: Number of writes waiting for their turn: one may be the stop, so batches of reads yield.
         self._urgent = dict.fromkeys(range(1, 128), 0)
         self._port = CanPort(self._settings, self._frame, self._event, self._idle, opener)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -127,7 +127,7 @@ class CanopenLink:
         self._workers = workers
 
     async def close(self) -> None:
-        """Stop cyclic data, close the adapter and the threads. Calling again does nothing."""
+        """Stop cyclic data, close the adapter and the threads. Further calls have no effect."""
         workers, self._workers = self._workers, None
         if workers is None:
             return
@@ -140,7 +140,7 @@ class CanopenLink:
             workers.shutdown(wait=True)
 
     def attach(self, station: int, profile: Profile) -> None:
-        """See `drivers.link.Link.attach`: its modes, and how its firmware reads CiA 301."""
+        """See `drivers.link.Link.attach`: modes, dialect and fixed PDOs of the drive."""
         self._profiles[station] = profile
         self._cyclic.set_modes(station, profile.supported_modes)
         self._cyclic.speak(station, dialect_of(profile))
@@ -152,7 +152,7 @@ class CanopenLink:
         return None if address.index is not None else text("link.no-object", address=str(address))
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
-        """See `drivers.link.Link.enumerate`: a node may carry its EDS instead (1021h)."""
+        """See `drivers.link.Link.enumerate`: a node may store its EDS instead (1021h)."""
         del progress
         raise lists_nothing(self.kind, station)
 
@@ -163,12 +163,12 @@ class CanopenLink:
         *,
         stop_after: int | None = None,
     ) -> list[Found]:
-        """Ask every node number for its device type, then who answers for its identity.
+        """Request the device type from every node number, and the identity from those that answer.
 
-        Numbers that two nodes answer for, and nodes that send heartbeats but answer nothing, are
-        in the result with a note.
+        Numbers with more than one answer, and nodes that send heartbeats but do not answer, are in
+        the result with a note.
         """
-        del stop_after  # sixteen are asked at once
+        del stop_after  # sixteen are queried at once
         numbers = sorted(set(stations if stations is not None else range(1, 128)))
         found: list[Found] = []
         for start in range(0, len(numbers), 16):
@@ -197,7 +197,7 @@ class CanopenLink:
         return sorted(found, key=lambda f: f.station)
 
     async def _answers(self, node: int) -> bool:
-        """Whether a node answers for this number."""
+        """Return whether a node answers under this number."""
         return bool(await self._in_worker(partial(probe, [self._channel(node)])))
 
     async def _identify(self, node: int, answers: list[bytes]) -> Found:
@@ -212,13 +212,13 @@ class CanopenLink:
         return replace(found, state=state)
 
     async def read(self, station: int, address: Address) -> bytes:
-        """Read one object. See `Link.read` for what comes back."""
+        """Read one object. See `Link.read` for the result."""
         return await self._run(station, lambda: self._read_now(station, address))
 
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several one after the other; a silent node or a loss ends it for the rest too."""
+        """Read several objects in turn; a silent node or a loss ends the rest too."""
         cancelled = threading.Event()
 
         def batch(addresses: Sequence[Address]) -> list[bytes | DriveError]:
@@ -242,10 +242,10 @@ class CanopenLink:
         return answers
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
-        """Write one object. A LinkTimeout leaves the outcome unknown; it is never repeated here."""
+        """Write one object; never repeated. After a LinkTimeout the outcome is unknown."""
         index, subindex = _object(address)
         if self._cyclic.drives(station, index, subindex):
-            # An SDO write would be overwritten by the next PDO.
+            # The next PDO would overwrite an SDO write.
             await self._in_worker(lambda: self._cyclic.put(station, index, subindex, data))
         else:
             self._channel(station)
@@ -256,7 +256,7 @@ class CanopenLink:
                 self._urgent[station] -= 1
 
     def quality(self, station: int | None = None) -> LinkQuality:
-        """Counters; for one station its SDO figures and NMT state, else those of the bus."""
+        """Return the SDO counters and NMT state of one station, or the counters of the bus."""
         port = self._port
         details: dict[str, float | int | str] = {
             "frames_received": port.received,
@@ -341,10 +341,10 @@ class CanopenLink:
         try:
             return await asyncio.shield(future)
         except asyncio.CancelledError:
-            # The thread cannot be interrupted; whoever comes next must not overtake it.
+            # The thread cannot be interrupted; the next job must not overtake it.
             if cancelled is not None:
                 cancelled.set()
-            # Nobody is left who would hear that it failed: asyncio would log that as a defect.
+            # No caller is left to retrieve its error: asyncio would log that as a defect.
             future.add_done_callback(_heard)
             await asyncio.wait([future])
             raise
@@ -399,7 +399,7 @@ class CanopenLink:
 
     @property
     def doctor(self) -> CanopenLink:
-        """It says itself why a station is not in Operational."""
+        """The link itself, which determines why a station is not in Operational."""
         return self
 
     async def stations_known(self) -> Sequence[int]:
@@ -419,7 +419,7 @@ class CanopenLink:
 
     @property
     def frames(self) -> CanopenLink:
-        """It keeps the last minute of its frames."""
+        """The link itself, which keeps the last minute of its frames."""
         return self
 
     async def flight(self, station: int | None = None) -> bytes:
@@ -451,7 +451,7 @@ def _object(address: Address) -> tuple[int, int]:
 
 
 def _fit(data: bytes, size: int | None) -> bytes:
-    """``data`` cut to ``size`` if what is cut off is only padding.
+    """Cut ``data`` to ``size`` if only padding is removed.
 
     Some drives send four bytes for every object, filled with zeros or with the sign.
     """
@@ -465,5 +465,5 @@ def _fit(data: bytes, size: int | None) -> bytes:
 
 
 def can_bus_of(link: Link | None) -> CanopenLink | None:
-    """The link of a CAN bus, for what only CANopen has; None for another bus."""
+    """Return the link as a CAN bus; None for another bus."""
     return link if isinstance(link, CanopenLink) else None

@@ -1,4 +1,4 @@
-"""What nodes say by themselves: boot-up, heartbeat, node guarding, emergencies. Pure.
+"""Unprompted messages of nodes: boot-up, heartbeat, node guarding, emergencies. Pure.
 
 Sources: CiA 301 v4.2.0 clauses 7.2.7 (emergency, table 26), 7.2.8.2.2 (node guarding, heartbeat)
 and 7.2.8.3.3 (boot-up).
@@ -12,7 +12,7 @@ from drivers.canopen.frames import EMERGENCY, HEARTBEAT, NMT_STATES, SDO_REQUEST
 from drivers.link import LinkEvent
 from drivers.texts.message import Param, Text, prose, text
 
-#: By the upper byte of the error code: its class (CiA 301 table 26).
+#: Class of an error code by its upper byte (CiA 301 table 26).
 _EMERGENCY_CLASSES = {
     0x00: text("emergency.none"),
     0x10: text("emergency.generic"),
@@ -54,21 +54,21 @@ _EMERGENCIES = {
 }
 _UNLISTED = text("emergency.unlisted")
 
-#: A heartbeat this many of its own periods late is lost; 0.1 s more for a busy host.
+#: A heartbeat is lost when this many of its periods late, plus 0.1 s for a busy host.
 _LATE_PERIODS = 2.5
 _LATE_EXTRA_S = 0.1
-#: The longest of so many intervals is the period: one that came late makes the next one short.
+#: Number of intervals kept; the longest is the period: a late heartbeat shortens the next interval.
 _INTERVALS_KEPT = 3
 _BOOTS_KEPT = 8
 _DUPLICATE_WINDOW_S = 10.0
 _FORGIVEN_S = 60.0
-"""Two nodes with one number go on answering twice; what a busy computer mixed up does not."""
-#: A drive that flickers sends hundreds of emergencies a second; so many of a node are reported.
+"""Two nodes with one number keep answering twice; mix-ups by a busy computer end."""
+#: Limit of the emergencies reported per node and second: a flickering drive sends hundreds.
 _EMERGENCIES_PER_S = 10
 
 
 def emergency_text(code: int) -> Text:
-    """What an emergency error code means: exact where CiA 301 has one, else its class."""
+    """Return the meaning of an emergency error code: exact if in CiA 301, else its class."""
     exact = _EMERGENCIES.get(code)
     if exact is not None:
         return exact
@@ -77,7 +77,7 @@ def emergency_text(code: int) -> Text:
 
 @dataclass(slots=True)
 class NodeRecord:
-    """What is known of one node."""
+    """State of one node."""
 
     node: int
     state: int | None = None
@@ -86,18 +86,18 @@ class NodeRecord:
     alive: bool = True
     boots: int = 0
     boots_s: list[float] = field(default_factory=list)
-    """When it booted, the last few times."""
+    """Times of its last boot-ups."""
     emergencies: int = 0
     last_emergency: int | None = None
     open_emergency: int | None = None
-    """The last emergency, until it is undone (code 0) or the node restarts."""
+    """The last emergency, until it is cleared (code 0) or the node restarts."""
     emergency_window_s: float | None = None
     emergencies_reported: int = 0
     emergencies_untold: int = 0
     guard_toggle: int | None = None
     toggle_repeated_s: float | None = None
     guarded: bool = False
-    """Its toggle bit was seen set, which heartbeats never have: it does answer guarding."""
+    """Its toggle bit was seen set, which it never is in heartbeats: it answers node guarding."""
     guard_asked_s: float | None = None
     foreign_master_s: float | None = None
     strays_s: list[float] = field(default_factory=list)
@@ -106,22 +106,22 @@ class NodeRecord:
 
     @property
     def period_s(self) -> float | None:
-        """Time between its heartbeats; None while none is known."""
+        """Time between its heartbeats; None while unknown."""
         return max(self.intervals_s, default=None)
 
     @property
     def state_text(self) -> str:
-        """NMT state by its name of CiA 301, its number where it has none, or empty."""
+        """Name of the NMT state in CiA 301, its number if it has no name, or empty."""
         return "" if self.state is None else NMT_STATES.get(self.state, f"{self.state}")
 
     @property
     def nmt_state(self) -> Text | None:
-        """NMT state for a list of stations; None while it is not known."""
+        """NMT state for a list of stations; None while unknown."""
         return prose(self.state_text) if self.state_text else None
 
     @property
     def shown_state(self) -> Text | None:
-        """What a list of stations shows: a conflict of numbers before the NMT state."""
+        """Text for a list of stations: a conflict of numbers, else the NMT state."""
         return self.conflict or self.nmt_state
 
 
@@ -131,19 +131,19 @@ class NodeWatch:
     def __init__(self) -> None:
         self.nodes: dict[int, NodeRecord] = {}
         self.sync_heard_s: float | None = None
-        """When somebody else sent SYNC."""
+        """Time of the last SYNC sent by another device."""
 
     def record(self, node: int) -> NodeRecord:
-        """The record of ``node``, made on first use."""
+        """Return the record of ``node``, created on first use."""
         return self.nodes.setdefault(node, NodeRecord(node))
 
     def is_there(self, node: int) -> bool:
-        """Whether this node was heard, or is asked by us."""
+        """Return whether this node was received or is in use here."""
         record = self.nodes.get(node)
         return record is not None and (record.last_heartbeat_s is not None or record.in_use)
 
     def observe(self, frame: Frame, now_s: float) -> list[LinkEvent]:
-        """Take in one received frame (not our own) and return what is worth telling."""
+        """Take one received frame (not our own) and return the events to report."""
         function, node = frame.cob_id & 0x780, frame.cob_id & 0x7F
         if frame.cob_id == SYNC and not frame.remote:
             self.sync_heard_s = now_s
@@ -190,7 +190,7 @@ class NodeWatch:
         return events
 
     def _is_heartbeat(self, record: NodeRecord, toggle: int) -> bool:
-        """Whether this is no guarding answer: heartbeats of a node that is asked all the same."""
+        """Return whether it is a heartbeat, not the answer to a guarding request."""
         return not record.guarded and record.guard_toggle == 0 == toggle
 
     def _boot(self, record: NodeRecord, now_s: float) -> LinkEvent:
@@ -244,7 +244,7 @@ class NodeWatch:
         return [*events, LinkEvent("emergency", record.node, message, code)]
 
     def _end_of_storm(self, record: NodeRecord, now_s: float) -> list[LinkEvent]:
-        """Every second emergencies are reported again, after how many were not."""
+        """Return the count of suppressed emergencies; reporting starts again every second."""
         if record.emergency_window_s is not None and now_s - record.emergency_window_s < 1.0:
             return []
         untold, code = record.emergencies_untold, record.last_emergency
@@ -256,7 +256,7 @@ class NodeWatch:
         return [LinkEvent("emergency", record.node, message, code)]
 
     def overdue(self, now_s: float) -> list[LinkEvent]:
-        """Nodes whose heartbeat stopped, each once; and emergencies not reported yet."""
+        """Return nodes whose heartbeat stopped, once each, and emergencies not yet reported."""
         events = []
         for record in self.nodes.values():
             if record.emergencies_untold:
@@ -281,9 +281,9 @@ class NodeWatch:
         return events
 
     def guard_due(self, guard_s: float, now_s: float) -> tuple[list[int], list[LinkEvent]]:
-        """Nodes to be asked for their state now, and those that did not answer the last time.
+        """Return the nodes to guard now, and events for those that did not answer last time.
 
-        Only nodes that are in use and send no heartbeat are asked.
+        Only nodes that are in use and send no heartbeat are guarded.
         """
         ask: list[int] = []
         events: list[LinkEvent] = []
@@ -308,10 +308,10 @@ class NodeWatch:
         return ask, events
 
     def stray_answer(self, node: int, now_s: float) -> LinkEvent | None:
-        """An SDO answer of ``node`` came that nobody here asked for.
+        """Count an SDO answer of ``node`` without a request from here; return an event if due.
 
-        Two within ten seconds, with no other master asking, mean two nodes with one number, until
-        there were none for a minute.
+        Two within ten seconds, without requests of another master, mean two nodes with one number,
+        until there are none for a minute.
         """
         record = self.record(node)
         record.strays_s = [t for t in record.strays_s if now_s - t < _DUPLICATE_WINDOW_S]

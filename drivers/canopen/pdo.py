@@ -1,4 +1,4 @@
-"""Which signal travels in which PDO, and the writes that configure the drive so. Pure.
+"""Distribution of signals over PDOs, and the writes that configure the drive accordingly. Pure.
 
 Source: CiA 301 v4.2.0 clauses 7.5.2.35 to 7.5.2.38 (PDO parameters) and 7.2.2 (PDO services).
 """
@@ -19,7 +19,7 @@ from drivers.link import CyclicSignal
 from drivers.texts.message import Text, text
 
 MAX_ENTRIES = 4
-"""Entries per PDO that every drive takes: DS_C has only subindices 1 to 4 (003:432-475)."""
+"""Entries per PDO that every drive accepts: DS_C has only subindices 1 to 4 (003:432-475)."""
 
 INVALID = 0x80000000
 SYNCHRONOUS = 1
@@ -27,18 +27,18 @@ SYNCHRONOUS = 1
 
 @dataclass(frozen=True, slots=True)
 class PdoPlan:
-    """One PDO of one node: number from 0 on, identifier, and the signals in order."""
+    """One PDO of one node: number from 0, direction, and the signals in order."""
 
     station: int
     direction: Literal["rx", "tx"]
     number: int
     signals: tuple[CyclicSignal, ...]
     fixed: FixedPdo | None = None
-    """What the drive holds there, where it does not let the contents be changed."""
+    """Contents in the drive, if they cannot be changed."""
 
     @property
     def cob_id(self) -> int:
-        """Identifier of the pre-defined connection set, or the drive's own of a fixed PDO."""
+        """Identifier in the pre-defined connection set, or that of the drive for a fixed PDO."""
         if self.fixed is not None:
             return self.fixed.cob_id
         return (RPDO if self.direction == "rx" else TPDO)[self.number] + self.station
@@ -55,13 +55,13 @@ class PdoPlan:
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         if self.fixed is not None:
             return self.fixed.size
         return sum(size_of(s.address.type) or 0 for s in self.signals)
 
     def placed(self) -> Iterator[tuple[CyclicSignal, int]]:
-        """Each signal with the byte at which it begins."""
+        """Iterate over the signals with their byte offsets."""
         starts = (
             {(a.index, a.subindex): start for a, start in self.fixed.starts()} if self.fixed else {}
         )
@@ -88,8 +88,8 @@ def plan(
 ) -> tuple[tuple[PdoPlan, ...], tuple[CyclicSignal, ...]]:
     """Distribute signals over four PDOs of 8 bytes per node and direction, in the order given.
 
-    ``fixed`` has the PDOs of stations that cannot be mapped again: those are used as they are.
-    Returns the PDOs and the signals that found no room (or are not mappable at all).
+    ``fixed`` has the PDOs of stations that cannot be mapped again: these are used unchanged.
+    Returns the PDOs and the signals that did not fit (or cannot be mapped at all).
     """
     pdos: list[PdoPlan] = []
     left: list[CyclicSignal] = []
@@ -132,10 +132,10 @@ def plan_within_load(
     bitrate: int,
     fixed: Mapping[int, Sequence[FixedPdo]] = MappingProxyType({}),
 ) -> LoadedPlan:
-    """As `plan`, leaving out the less important signals while the bus would be too full.
+    """Plan as `plan`, leaving out the less important signals while the bus load is too high.
 
-    Signals of a station count as the more important the earlier they come; its first 3 inputs and
-    first 5 outputs are never left out.
+    Signals of a station are in order of importance; its first 3 inputs and first 5 outputs are
+    never left out.
 
     Raises:
         NotAllowed: even those need more than 80 % of the bus.
@@ -190,9 +190,9 @@ def _pack(
 
 
 def set_up(pdo: PdoPlan, flags: int = 0) -> list[SdoWrite]:
-    """Writes that map ``pdo`` and make it synchronous, in the order CiA 301 asks for.
+    """Return the writes that map ``pdo`` and make it synchronous, in the order of CiA 301.
 
-    ``flags`` are the bits 29 and 30 that the identifier had before.
+    ``flags`` are bits 29 and 30 of the previous identifier.
     """
     entries = [mapping_entry(s) for s in pdo.signals]
     identifier = pdo.cob_id | flags
@@ -210,7 +210,7 @@ def set_up(pdo: PdoPlan, flags: int = 0) -> list[SdoWrite]:
 
 
 def mapping_entry(signal: CyclicSignal) -> int:
-    """Index, subindex and length in bits as a mapping object holds them."""
+    """Return index, subindex and length in bits as in a mapping object."""
     address = signal.address
     bits = 8 * (size_of(address.type) or 0)
     return (address.index or 0) << 16 | address.subindex << 8 | bits

@@ -1,4 +1,4 @@
-"""One open CAN adapter: a receiving thread, sending, and coming back after a loss."""
+"""One open CAN adapter: receiving thread, sending, and reopening after a loss."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class CanPort:
 
     @property
     def connected(self) -> bool:
-        """The adapter is open and not bus-off."""
+        """Whether the adapter is open and not bus-off."""
         return self._bus is not None
 
     @property
@@ -87,7 +87,7 @@ class CanPort:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop receiving and close the adapter. Calling again does nothing."""
+        """Stop receiving and close the adapter. Further calls have no effect."""
         self._closing.set()
         thread, self._thread = self._thread, None
         if thread is not None:
@@ -95,10 +95,10 @@ class CanPort:
         self._drop_bus()
 
     def send(self, frame: Frame) -> None:
-        """Put a frame on the bus.
+        """Send a frame.
 
         Raises:
-            LinkLost: adapter gone, bus-off, or nobody acknowledges.
+            LinkLost: adapter gone, bus-off, or no acknowledge.
         """
         message = can.Message(
             arbitration_id=frame.cob_id,
@@ -168,7 +168,7 @@ class CanPort:
         self._recover(why, "fault", _FIRST_RETRY_S)
 
     def _count(self, message: can.Message) -> None:
-        """What kind of error it is: an acknowledge that is missing, damage, or a counter."""
+        """Count the kind of error: missing acknowledge, damaged frame, or error counters."""
         kind = message.arbitration_id
         if kind & ERROR_ACKNOWLEDGE:
             self.acknowledge_errors += 1
@@ -178,7 +178,7 @@ class CanPort:
             self.error_passive += 1
 
     def _recover(self, why: LinkLost, kind: str, retry_s: float) -> None:
-        """Tell of the loss, then try until the adapter is open again or the port closes."""
+        """Report the loss, then retry until the adapter is open again or the port closes."""
         self._why = why
         self._drop_bus()
         remedy = why.remedy_text

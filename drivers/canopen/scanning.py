@@ -1,4 +1,4 @@
-"""Finding nodes and asking who they are. Runs on a worker thread."""
+"""Search and identification of nodes. Runs on a worker thread."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _SERVO = 402
 
 
 def probe(channels: Sequence[SdoChannel]) -> dict[int, list[bytes]]:
-    """Ask all these nodes at once for their device type; answers by node, silent ones left out.
+    """Request the device type from all these nodes at once; return answers by responding node.
 
     Raises:
         LinkLost: the adapter is gone.
@@ -35,7 +35,7 @@ def probe(channels: Sequence[SdoChannel]) -> dict[int, list[bytes]]:
 
 
 def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) -> Found:
-    """Read the identity of a node that answered; objects it does not have stay None or empty."""
+    """Read the identity of a node that answered; missing objects stay None or empty."""
     notes: list[Text] = []
     if len(answers) > 1:
         notes.append(text("canopen.note-same-number", node_count=len(answers), node=channel.node))
@@ -53,7 +53,7 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
 
     return Found(
         station=channel.node,
-        # 0 is no vendor and no serial number: a drive that says so has none to show.
+        # 0 is neither a vendor nor a serial number: the drive has none.
         vendor_id=number(0x1018, 1) or None,
         product_code=number(0x1018, 2),
         revision=number(0x1018, 3),
@@ -67,7 +67,7 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
 
 
 def _device_type(channel: SdoChannel, answer: bytes, timeout_s: float) -> int | None:
-    """What the answer to the probe says, or None where it was refused."""
+    """Return the device type in the answer to the probe, or None if it was refused."""
     if answer[0] & 0xE0 != 0x40:
         return None
     if answer[0] & 0x02:
@@ -87,7 +87,7 @@ def _read(channel: SdoChannel, index: int, subindex: int, timeout_s: float) -> b
 
 
 def readable(data: bytes) -> str:
-    """Text as sent, or the number where a drive keeps versions as numbers (DS_C, 003:421)."""
+    """Return text as sent, or the number if a drive stores versions as numbers (DS_C, 003:421)."""
     if 0 < len(data) <= 4 and not all(0x20 <= byte < 0x7F for byte in data):
         return str(int.from_bytes(data, "little"))
     return text_of(data)

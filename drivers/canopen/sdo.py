@@ -1,9 +1,8 @@
-"""The client's side of SDO transfers as generators without any I/O.
+"""Client side of SDO transfers as generators without any I/O.
 
-A transfer yields `Exchange`s (what to send, what answer to wait for) and is sent the answers;
-its return value is the result. The caller owns time-outs. All frames are 8 bytes.
-
-Source: CiA 301 v4.2.0 clause 7.2.4.3.
+A transfer yields `Exchange`s (what to send, which answer to wait for) and receives the answers; its
+return value is the result. The caller handles time-outs. All frames are 8 bytes. Source: CiA 301
+v4.2.0 clause 7.2.4.3.
 """
 
 from __future__ import annotations
@@ -36,10 +35,10 @@ _BLOCK = 127
 
 
 class Exchange(NamedTuple):
-    """One turn of a transfer.
+    """One request and its answer.
 
-    ``mux`` is what a first answer must carry in bytes 1 to 3 (index, subindex); segments carry
-    none. With ``answered`` False nothing answers, as after an abort.
+    ``mux`` is what a first answer must contain in bytes 1 to 3 (index, subindex); segments contain
+    none. ``answered`` is False for frames without an answer, such as an abort.
     """
 
     send: tuple[bytes, ...]
@@ -51,24 +50,24 @@ Transfer = Generator[Exchange, bytes, T]
 
 
 def multiplexer(index: int, subindex: int) -> bytes:
-    """Index and subindex as SDO frames carry them."""
+    """Return index and subindex as in SDO frames."""
     return struct.pack("<HB", index, subindex)
 
 
 def abort_frame(mux: bytes, code: int) -> bytes:
-    """A frame that ends the transfer of ``mux``."""
+    """Return a frame that aborts the transfer of ``mux``."""
     return bytes([ABORT]) + mux + struct.pack("<I", code)
 
 
 def upload(index: int, subindex: int, block_above: int | None = None) -> Transfer[bytes]:
     """Read an object, expedited or in segments as the server decides.
 
-    An object announced with more than ``block_above`` bytes is read by block transfer instead,
-    where the server offers it.
+    An object announced with more than ``block_above`` bytes is read by block transfer instead, if
+    the server supports it.
 
     Raises:
         Rejected: the server aborted.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
+        ProtocolError: an answer that CiA 301 does not allow; the server was sent an abort.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((bytes([0x40]) + mux + bytes(4),), mux)
@@ -120,18 +119,18 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
 
 
 def expedited(index: int, subindex: int, data: bytes) -> bytes:
-    """The request that writes 1 to 4 bytes at once (CiA 301 clause 7.2.4.3.3)."""
+    """Return the request that writes 1 to 4 bytes at once (CiA 301 clause 7.2.4.3.3)."""
     return (
         bytes([0x23 | (4 - len(data)) << 2]) + multiplexer(index, subindex) + data.ljust(4, b"\0")
     )
 
 
 def download(index: int, subindex: int, data: bytes) -> Transfer[None]:
-    """Write an object: expedited up to 4 bytes, in segments above.
+    """Write an object: expedited up to 4 bytes, otherwise in segments.
 
     Raises:
         Rejected: the server aborted.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
+        ProtocolError: an answer that CiA 301 does not allow; the server was sent an abort.
     """
     mux = multiplexer(index, subindex)
     if 1 <= len(data) <= 4:
@@ -163,7 +162,7 @@ def block_upload(index: int, subindex: int) -> Transfer[bytes]:
 
     Raises:
         Rejected: the server aborted; code 05040001h means that it has no block transfer.
-        ProtocolError: wrong CRC, length or answer; the server has been informed.
+        ProtocolError: wrong CRC, length or answer; the server was sent an abort.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((b"\xa4" + mux + bytes([_BLOCK, 0, 0, 0]),), mux)
@@ -215,7 +214,7 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
 
     Raises:
         Rejected: the server aborted; code 05040001h means that it has no block transfer.
-        ProtocolError: an answer that CiA 301 does not allow; the server has been informed.
+        ProtocolError: an answer that CiA 301 does not allow; the server was sent an abort.
     """
     mux = multiplexer(index, subindex)
     answer = yield Exchange((b"\xc6" + mux + struct.pack("<I", len(data)),), mux)
@@ -256,9 +255,9 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
 
 
 def answers(frame: bytes, exchange: Exchange) -> bool:
-    """Whether ``frame`` can be the answer to ``exchange``: right object, or a segment.
+    """Return whether ``frame`` can be the answer to ``exchange``: same object, or a segment.
 
-    An abort may name object 0000:00: several makers' firmware does not fill it in.
+    An abort may contain object 0000:00: the firmware of several manufacturers does not fill it in.
     """
     if len(frame) != 8:
         return False

@@ -1,8 +1,8 @@
-"""slcan adapters: python-can's client, made to report refused frames and of bus-off.
+"""slcan adapters: python-can's client, extended to report refused frames and bus-off.
 
-python-can drops the adapter's BEL (a frame it could not send) and never asks for the status
-flags, so a bus-off would only look like silence. It also reads one byte per system call.
-Source of the commands: Lawicel CAN232 manual V3, "F" status flags and "t" return values.
+python-can drops the adapter's BEL (a frame it could not send) and never reads the status flags, so
+a bus-off would only look like silence. It also reads one byte per system call. Source of the
+commands: Lawicel CAN232 manual V3, "F" status flags and "t" return values.
 """
 
 from __future__ import annotations
@@ -17,14 +17,12 @@ from drivers.computer.terminals import TERMINAL_ERRORS, flush
 
 
 class AdapterBlocked(can.CanOperationError):
-    """The adapter takes no more frames."""
+    """The adapter accepts no more frames: its buffer is full, as it cannot send them."""
 
 
 class AdapterLost(can.CanOperationError):
-    """The adapter does not answer the computer any more."""
+    """The adapter no longer responds to the computer."""
 
-
-"""Said where its own buffer is full: it is there, but what it has cannot be sent."""
 
 #: TypeError: pyserial writes to a descriptor that another thread has closed.
 _GONE: tuple[type[Exception], ...] = (OSError, TypeError, *TERMINAL_ERRORS)
@@ -37,11 +35,11 @@ ERROR_BUS_OFF = 0x40
 ERROR_CONTROLLER = 0x04
 ERROR_PROTOCOL = 0x08
 ERROR_ACKNOWLEDGE = 0x20
-"""Error classes as Linux SocketCAN numbers them (linux/can/error.h)."""
+"""Error classes as numbered by Linux SocketCAN (linux/can/error.h)."""
 
 
 class SlcanBus(slcanBus):
-    """As python-can's, but a BEL makes it ask for the flags, which come back as error frames."""
+    """As python-can's, but reads the status flags after a BEL and returns them as error frames."""
 
     _asked_s = float("-inf")
 
@@ -72,7 +70,7 @@ class SlcanBus(slcanBus):
             raise AdapterLost(f"the adapter is gone: {error}") from error
 
     def _ask_for_flags(self) -> None:
-        """At most twice a second: an adapter that does not know F answers it with BEL again."""
+        """Read the flags, at most twice a second: an adapter without F answers with BEL again."""
         now_s = time.monotonic()
         if now_s - self._asked_s >= _ASK_AGAIN_S:
             self._asked_s = now_s

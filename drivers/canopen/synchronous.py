@@ -1,6 +1,6 @@
 """The SYNC loop: one thread, absolute deadlines, samples in and setpoints out.
 
-What an axis does with its setpoints is the same on every bus: `drivers.motion.playback`.
+The handling of an axis's setpoints is the same on every bus: `drivers.motion.playback`.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ _SILENT_BRAKED = Halted(HaltCause.LOST, note=text("canopen.cyclic-data-stopped-c
 
 
 class LoopClock(Protocol):
-    """What the loop takes time from; a test may let it pass as it likes."""
+    """Time source of the loop; a test may replace it."""
 
     def now_s(self) -> float:
-        """Seconds since any point."""
+        """Return the time in seconds since any fixed point."""
 
     def wait_until(self, due_s: float) -> None:
-        """Return at ``due_s``, or at once when that is over."""
+        """Return at ``due_s``, or at once if that is past."""
 
 
 class ComputerClock:
@@ -70,7 +70,7 @@ class _Statistics:
 
 
 class SyncLoop:
-    """Sends SYNC and output PDOs every ``cycle_s``, gathers input PDOs into blocks.
+    """Sends SYNC and output PDOs every ``cycle_s``, collects input PDOs into blocks.
 
     Every public method may be called from any thread. ``deliver`` and ``notify`` are called on the
     loop's thread and must not block.
@@ -127,11 +127,11 @@ class SyncLoop:
 
     @property
     def bus_lost(self) -> bool:
-        """The last cycle could not be sent."""
+        """Whether the last cycle could not be sent."""
         return self._bus_lost
 
     def stop(self) -> None:
-        """End the thread at once; `halt_and_wait` first to stop motion."""
+        """End the thread at once; call `halt_and_wait` first to stop motion."""
         with self._lock:
             self._stopping = True
         self._thread.join()
@@ -148,12 +148,12 @@ class SyncLoop:
         return True
 
     def forget_arrivals(self) -> None:
-        """Count again which input PDOs came."""
+        """Reset the record of the input PDOs received."""
         with self._lock:
             self._came.clear()
 
     def arrivals(self, station: int) -> tuple[int, tuple[int, ...]]:
-        """How many input PDOs a station has, and which did not come since `forget_arrivals`."""
+        """Return the number of input PDOs, and those missing since `forget_arrivals`."""
         with self._lock:
             wanted = {
                 slot.cob_id for (node, _, _), slot in self.images.inputs.items() if node == station
@@ -161,7 +161,7 @@ class SyncLoop:
             return len(wanted), tuple(sorted(wanted - self._came))
 
     def put(self, key: Key, data: bytes) -> None:
-        """Change an output; returns when the frame and the SYNC that makes it valid are sent.
+        """Change an output; return when the frame and the SYNC that makes it valid are sent.
 
         Raises:
             LinkLost: the bus is gone.
@@ -180,17 +180,17 @@ class SyncLoop:
                 raise LinkLost("canopen.bus-lost")
 
     def axis(self, station: int, use: Callable[[AxisLoop], None]) -> None:
-        """Do something with the axis of ``station`` between two cycles; nothing without one."""
+        """Call ``use`` with the axis of ``station`` between two cycles, if it has one."""
         with self._lock:
             axis = self.images.axes.get(station)
             if axis is not None:
                 use(axis)
 
     def play(self, motions: Sequence[tuple[int, Motion]]) -> int:
-        """Begin together in the next cycle; returns its number.
+        """Start motions together in the next cycle; return its number.
 
         Raises:
-            NotAllowed: one of them cannot begin; then none does.
+            NotAllowed: one of them cannot start; then none does.
             LinkLost: the bus is gone.
         """
         with self._lock:
@@ -203,7 +203,7 @@ class SyncLoop:
             return self._cycle
 
     def halt(self, station: int | None, why: Halted) -> None:
-        """Brake one station, or all with None, and leave Operation enabled."""
+        """Brake one station, or all for None, and leave Operation enabled."""
         with self._lock:
             for axis in self.images.axes.values():
                 if station in (None, axis.station):
@@ -211,7 +211,7 @@ class SyncLoop:
                     axis.stop(why, State.READY)
 
     def abandon(self, station: int | None, why: Halted) -> None:
-        """A node or the bus is lost: setpoints end without a ramp, as nobody receives it."""
+        """End setpoints without a ramp, as the node or bus is lost and would not receive it."""
         with self._lock:
             for node in self.images.stations:
                 if station in (None, node):
@@ -219,12 +219,12 @@ class SyncLoop:
                     self.images.neutralise(node, why)
 
     def halts(self, station: int) -> int:
-        """How often this station was halted or abandoned."""
+        """Return how many times this station was halted or abandoned."""
         with self._lock:
             return self._halts[station]
 
     def halt_and_wait(self) -> None:
-        """Stop everything and wait until nothing is enabled, at most 1.5 s. Blocks."""
+        """Stop everything and wait until no axis is enabled, at most 1.5 s. Blocks."""
         self.halt(None, Halted(HaltCause.COMMANDED, note=text("canopen.cyclic-exchange-ends")))
 
         def still() -> bool:
@@ -238,7 +238,7 @@ class SyncLoop:
             self._lock.wait_for(still, 1.5)
 
     def newest(self, within_s: float) -> dict[str, int | float]:
-        """Inputs of the last cycle by channel, as `drivers.link.Cyclic.newest`."""
+        """Return the inputs of the last cycle by channel, as `drivers.link.Cyclic.newest`."""
         with self._lock:
             sampled_s = self._sampled_s
             if self._bus_lost or sampled_s is None:
@@ -252,7 +252,7 @@ class SyncLoop:
             }
 
     def statistics(self) -> dict[str, float | int | str]:
-        """Figures for link quality."""
+        """Return figures for the link quality."""
         with self._lock:
             late = sorted(self._statistics.lateness_us)
             return {
@@ -314,7 +314,7 @@ class SyncLoop:
         self._bus_lost = False
 
     def _skip(self, missed: int) -> None:
-        """The computer was late by whole cycles: those samples do not exist."""
+        """Skip whole cycles that the computer missed: their samples do not exist."""
         with self._lock:
             self._flush()
             self._dropped += missed
@@ -332,7 +332,8 @@ class SyncLoop:
         self._statistics.incomplete += not valid
         if not self._rows:
             self._block_cycle = self._sent_cycle
-        # Next to what SYNC called for stands what went out in the same cycle, for the next SYNC.
+        # The inputs triggered by SYNC are stored with the outputs sent in the same cycle, for the
+        # next SYNC.
         self._rows.append([*self.images.values, *self._sent])
         self._row_valid.append(valid)
         for station, axis in self.images.axes.items():
@@ -347,12 +348,13 @@ class SyncLoop:
             self._flush()
 
     def _silent(self, station: int, axis: AxisLoop) -> None:
-        """A cycle without this station's inputs: one is forgiven, many are not."""
+        """Handle a cycle without this station's inputs: one is tolerated, several are not."""
         axis.blind()
         before = self._silent_s[station]
         self._silent_s[station] = now = before + self.cycle_s
         if before < _BRAKE_WHEN_SILENT_S <= now:
-            # Where the line is cut it hears nothing of that, and goes on as its watchdog lets it.
+            # With a cut line the drive receives none of this, and its own watchdog determines what
+            # it does.
             axis.stop(_SILENT_BRAKED)
         if before < _GIVE_UP_WHEN_SILENT_S <= now:
             self.images.neutralise(station, _SILENT)

@@ -1,4 +1,4 @@
-"""Trajectories as the loop plays them."""
+"""Conversion of trajectories to motions of the loop."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.motion.setpoints import longest_step
 
 
 def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
-    """A trajectory whose values fit (`drivers.motion.setpoints.require_fits`), in cycles."""
+    """Convert a trajectory checked by `drivers.motion.setpoints.require_fits` to cycles."""
     envelope = trajectory.envelope
     offsets = trajectory.offset_values
     return Motion(

@@ -28,9 +28,9 @@ _OPTIONS = ("bitrate", "timeout_ms", "own_id", "guard_ms", "settle_ms", "port", 
 class CanUrl:
     """A parsed CANopen URL.
 
-    ``timeout_s`` is for one SDO answer. ``own_id`` is the number under which this tool sends its
-    own heartbeat. ``guard_s`` asks silent nodes for their state that often (node guarding), 0
-    never. ``settle_s`` is how long a serial adapter is left alone after opening.
+    ``timeout_s`` is the time-out of one SDO answer. ``own_id`` is the node number under which this
+    tool sends its own heartbeat. ``guard_s`` is the period of node guarding for silent nodes, 0 for
+    none. ``settle_s`` is the delay after opening a serial adapter.
     """
 
     url: str
@@ -46,11 +46,11 @@ class CanUrl:
 
 
 def parse_canopen_url(url: str) -> CanUrl:
-    """Take a URL apart.
+    """Parse a URL.
 
     Raises:
-        OutOfRange: another scheme, unknown interface, option or bit rate, or a channel that is
-            none of this interface; the message lists what there is.
+        OutOfRange: another scheme, unknown interface, option or bit rate, or a channel that
+            does not fit the interface; the message lists the valid ones.
     """
     parts = urlsplit(url)
     if parts.scheme != "canopen":
@@ -96,7 +96,7 @@ def parse_canopen_url(url: str) -> CanUrl:
 
 
 def _port(options: dict[str, str]) -> int | None:
-    # Below 1024 other services listen, to which a frame would be a message.
+    # Other services listen below 1024 and would interpret a frame as a message.
     port = int(_number(options, "port", 0, 0, 65535))
     return int(_number(options, "port", 0, 1024, 65535)) if port else None
 

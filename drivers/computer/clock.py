@@ -1,4 +1,4 @@
-"""Clocks that one system has and another has not."""
+"""Clocks that are not available on every system."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import time
 
 
 def resolution_s() -> float:
-    """The steps of `time.monotonic`: 15.6 ms on Windows before CPython 3.13, else below 1 µs."""
+    """Return the resolution of `time.monotonic` [s]: 15.6 ms on Windows before CPython 3.13."""
     return time.get_clock_info("monotonic").resolution
 
 
 def elapsed_s() -> float:
-    """Seconds since some time before the start of this process; never set, never back.
+    """Return the seconds since a time before the start of this process; never set, never back.
 
-    Time in which the computer slept counts on Linux (CLOCK_BOOTTIME).
+    Includes the time in which the computer slept on Linux (CLOCK_BOOTTIME).
     """
     if sys.platform == "linux":
         return time.clock_gettime(time.CLOCK_BOOTTIME)

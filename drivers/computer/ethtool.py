@@ -1,6 +1,6 @@
-"""What a network card itself does with frames before they are delivered (ethtool, linux/ethtool.h).
+"""Processing of frames in a network card before delivery (ethtool, linux/ethtool.h).
 
-Only the few settings that delay single frames: coalescing of interrupts and grouping of frames.
+Only the settings that delay single frames: coalescing of interrupts and grouping of frames.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ SETTINGS = ("rx-usecs", "tx-usecs", "gro", "lro")
 
 
 def read_card(interface: str) -> Mapping[str, int]:
-    """The settings that this card has, by their names in `SETTINGS`; µs, or 1 for on.
+    """Read the settings of this card, by their names in `SETTINGS`; µs, or 1 for on.
 
-    What a card or driver does not support is absent; nothing is read elsewhere than on Linux.
+    Settings that a card or driver does not support are absent; empty on systems other than Linux.
     """
     found: dict[str, int] = {}
     coalesce = _ask(interface, _COALESCE.pack(_GCOALESCE, *[0] * 22))
@@ -47,7 +47,8 @@ def write_card(interface: str, name: str, value: int) -> None:
     """Set one of `SETTINGS`.
 
     Raises:
-        OSError: not permitted (CAP_NET_ADMIN), or the card does not take it.
+        OSError: not permitted (CAP_NET_ADMIN), or the card does not accept it.
+        ValueError: not one of `SETTINGS`.
     """
     if name in ("rx-usecs", "tx-usecs"):
         now = _require(interface, _COALESCE.pack(_GCOALESCE, *[0] * 22))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 
 def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
-    """Write these one after the other, by one system call where there is one; bytes written.
+    """Write the parts in order, by one system call if there is one; return the bytes written.
 
     Raises:
         OSError: nothing was written.
@@ -20,5 +20,5 @@ def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
 
 
 def program_name(name: str) -> str:
-    """The name of a program's file."""
+    """Return the file name of a program."""
     return f"{name}.exe" if sys.platform == "win32" else name

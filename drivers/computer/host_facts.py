@@ -1,4 +1,4 @@
-"""What of this computer decides how punctual it is: read from the kernel's files, not judged.
+"""Facts about this computer that determine its timing: read from kernel files, not evaluated.
 
 Sources: proc(5), sysfs-devices-system-cpu and sysfs-class-net (Documentation/ABI of Linux).
 """
@@ -24,7 +24,7 @@ _IFF_UP = 1
 
 @dataclass(frozen=True, slots=True)
 class IdleState:
-    """A C-state that is not switched off: its latency of leaving it, and its switches' files."""
+    """A C-state that is not disabled: its exit latency, and the files that disable it."""
 
     name: str
     latency_us: int
@@ -33,7 +33,7 @@ class IdleState:
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """A network interface as a port for EtherCAT; None is what the system does not say."""
+    """A network interface as a port for EtherCAT; None for facts that the system does not state."""
 
     name: str
     exists: bool
@@ -45,12 +45,12 @@ class Port:
     carries_ip: bool = False
     card: Mapping[str, int] = field(default_factory=dict)
     interrupts: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
-    """By number: the cores that may handle it."""
+    """Cores that may handle an interrupt, by interrupt number."""
 
 
 @dataclass(frozen=True, slots=True)
 class HostFacts:
-    """This computer; shares are 0…1, times µs. ``port`` is None where no interface was named."""
+    """This computer; shares are 0…1, times µs. ``port`` is None if no interface was given."""
 
     kernel: str
     preemption: Preemption
@@ -58,7 +58,7 @@ class HostFacts:
     busy: tuple[float, ...]
     stolen: float
     governors: Mapping[str, str]
-    """By the file that sets it."""
+    """Governors by the file that sets them."""
     idle_states: tuple[IdleState, ...]
     capabilities: frozenset[str]
     fifo_allowed: bool
@@ -70,16 +70,16 @@ class HostFacts:
 
 @dataclass(frozen=True, slots=True)
 class Computer:
-    """Where the facts are read: the real system, or a folder that looks like one (tests)."""
+    """Source of the facts: the real system, or a folder with the same layout (tests)."""
 
     root: Path = Path("/")
     read_card: Callable[[str], Mapping[str, int]] = read_card
     wait: Callable[[], None] = lambda: time.sleep(_BUSY_SAMPLE_S)
     interface_flags: Callable[[str], int] = interface_flags
-    """Of the network namespace of this process; /sys shows another one's interfaces."""
+    """Interface flags in the network namespace of this process; /sys may show another one's."""
 
     def facts(self, interface: str = "") -> HostFacts:
-        """Look at everything. Takes about 0.3 s, in which the cores' load is seen."""
+        """Read all facts. Takes about 0.3 s to measure the load of the cores."""
         before = self._times()
         self.wait()
         busy, stolen = _shares(before, self._times())
@@ -108,7 +108,7 @@ class Computer:
         )
 
     def text(self, path: str) -> str:
-        """The file's content without its end of line; empty where there is none."""
+        """Return the file's content without the end of line; empty without the file."""
         try:
             return (self.root / path).read_text("utf-8", "replace").strip()
         except OSError:
@@ -118,7 +118,7 @@ class Computer:
         """Set one of the kernel's switches.
 
         Raises:
-            OSError: not permitted, not there, or not accepted.
+            OSError: not permitted, not present, or not accepted.
         """
         (self.root / path).write_text(value, "utf-8")
 
@@ -129,7 +129,7 @@ class Computer:
         return sorted((self.root / folder).glob(pattern))
 
     def _times(self) -> list[list[int]]:
-        """Per core: user, nice, system, idle, iowait, irq, softirq, steal (in ticks)."""
+        """Return per core: user, nice, system, idle, iowait, irq, softirq, steal [ticks]."""
         lines = self.text("proc/stat").splitlines()
         found = (re.match(r"cpu\d+ (.*)", line) for line in lines)
         return [[int(number) for number in one[1].split()[:8]] for one in found if one]
@@ -159,7 +159,7 @@ class Computer:
         )
 
     def _processes(self) -> list[list[str]]:
-        """Command lines; the program without its folder."""
+        """Return command lines; the program without its folder."""
         found = []
         for file in (self.root / "proc").glob("[0-9]*/cmdline"):
             try:
@@ -193,7 +193,7 @@ class Computer:
         )
 
     def _manager(self, index: str) -> str:
-        """Who configures the interface by itself."""
+        """Return the service that configures the interface automatically."""
         state = self.text(f"run/NetworkManager/devices/{index}")
         return "NetworkManager" if re.search(r"^managed=(true|full)$", state, re.MULTILINE) else ""
 
@@ -224,7 +224,7 @@ def _preemption(version: str, realtime: str) -> Preemption:
 
 
 def _limit(limits: str, name: str) -> float:
-    """The soft limit of /proc/self/limits."""
+    """Return a soft limit of /proc/self/limits."""
     found = re.search(rf"^{name}\s+(\S+)", limits, re.MULTILINE)
     if found is None:
         return 0.0
@@ -232,7 +232,7 @@ def _limit(limits: str, name: str) -> float:
 
 
 def _shares(before: list[list[int]], after: list[list[int]]) -> tuple[tuple[float, ...], float]:
-    """Of each core the share that was busy, and of all of them the share that was stolen."""
+    """Return the busy share of each core, and the stolen share of all of them."""
     busy, stolen, whole = [], 0, 0
     for old, new in zip(before, after, strict=False):
         passed = [late - early for early, late in zip(old, new, strict=False)]
@@ -245,7 +245,7 @@ def _shares(before: list[list[int]], after: list[list[int]]) -> tuple[tuple[floa
 
 
 def _cores(listed: str) -> tuple[int, ...]:
-    """``0-2,5`` as 0, 1, 2, 5."""
+    """Return ``0-2,5`` as 0, 1, 2, 5."""
     found: list[int] = []
     for part in filter(None, listed.split(",")):
         first, _, last = part.partition("-")

@@ -1,4 +1,4 @@
-"""Settings of the computer that are read, changed and restored: the kernel's and the cards'."""
+"""Settings of kernel and network cards that are read, changed and restored."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 from drivers.computer.ethtool import SETTINGS, write_card
 from drivers.computer.host_facts import Computer
 
-#: Nothing else is ever written, whatever a restore list on the disk says.
+#: Only these are ever written, whatever a restore list on the disk contains.
 _FILES = ("sys/devices/system/cpu/", "proc/irq/")
 
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One switch: ``card`` is the interface whose card has it, empty for a file of the kernel.
+    """One setting: ``card`` is the interface of the card, empty for a file of the kernel.
 
     Raises:
         ValueError: neither a setting of a card nor one of the files that may be written.
@@ -33,12 +33,12 @@ class Setting:
 
 
 def affinity(interrupt: int) -> Setting:
-    """The cores that handle an interrupt (proc(5), /proc/irq/N/smp_affinity_list)."""
+    """Return the setting for the cores that handle an interrupt (/proc/irq/N/smp_affinity_list)."""
     return Setting(f"proc/irq/{interrupt}/smp_affinity_list")
 
 
 def command(setting: Setting, value: str) -> str:
-    """The command that sets it by hand."""
+    """Return the command that sets it by hand."""
     if not setting.card:
         return f"echo {value} | sudo tee /{setting.place}"
     if setting.place.endswith("usecs"):
@@ -54,7 +54,7 @@ class HostSettings:
     write_card: Callable[[str, str, int], None] = write_card
 
     def read(self, setting: Setting) -> str:
-        """The value now; empty where it is not there."""
+        """Return the present value; empty if the setting does not exist."""
         if setting.card:
             return str(self.computer.read_card(setting.card).get(setting.place, ""))
         return self.computer.text(setting.place)
@@ -63,7 +63,7 @@ class HostSettings:
         """Set it.
 
         Raises:
-            OSError: not permitted, not there, or not accepted.
+            OSError: not permitted, not present, or not accepted.
         """
         if setting.card:
             self.write_card(setting.card, setting.place, int(value))

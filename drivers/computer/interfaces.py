@@ -15,9 +15,9 @@ _ARPHRD_ETHER, _ARPHRD_CAN = 1, 280
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """One interface; ``up`` is whether it can carry frames now (not reported as down).
+    """One interface; ``up``: it can carry frames now (not reported as down).
 
-    ``title`` is what a person knows it by, where that is not its name.
+    ``title`` is a name for people, if it differs from ``name``.
     """
 
     name: str
@@ -28,8 +28,10 @@ class Interface:
 
 
 def network_interfaces(net: Path = _NET) -> list[Interface]:
-    """What the system lists. Only Linux says of what kind each is; elsewhere those are listed that
-    the packet capture library can open, wireless ones among them.
+    """Return the interfaces that the system lists.
+
+    Only Linux reports the kind of each; elsewhere the list has those that the packet capture
+    library can open, including wireless ones.
     """
     if sys.platform != "linux":
         return [

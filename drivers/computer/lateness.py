@@ -1,10 +1,9 @@
-"""Measures how late this computer wakes a real-time thread, and how long a frame takes.
+"""Measures the wake-up delay of a real-time thread and the round trip of a frame.
 
-Runs as a process of its own under the conditions that the EtherCAT process has, so that nothing of
-the server's own scheduling changes: ``python -m drivers.computer.lateness PERIOD_US SECONDS
-[INTERFACE]`` prints one line of JSON. With an interface each cycle sends one EtherCAT frame that
-reads register 0000h of all slaves (BRD: nothing is written in them) and waits for its return until
-the cycle ends.
+Runs as a process of its own under the conditions of the EtherCAT process, so that the server's own
+scheduling has no influence: ``python -m drivers.computer.lateness PERIOD_US SECONDS [INTERFACE]``
+prints one line of JSON. With an interface each cycle sends one EtherCAT frame that reads register
+0000h of all slaves (BRD: nothing is written) and waits for its return until the cycle ends.
 """
 
 from __future__ import annotations
@@ -22,23 +21,23 @@ from dataclasses import asdict, dataclass
 from drivers.computer import realtime
 from drivers.computer.sockets import AF_PACKET
 
-#: Upper ends of the classes of the histograms, µs: six to a decade from 1 µs to 1 s.
+#: Upper edges of the histogram bins [µs]: six per decade from 1 µs to 1 s.
 EDGES_US = tuple(round(10 ** (step / 6), 2) for step in range(37))
 _ETH_P_ECAT = 0x88A4
 _UNANSWERED = 50
-"""Frames in a row without an answer after which none are sent any more."""
+"""Consecutive frames without an answer after which no more are sent."""
 
 
 @dataclass(slots=True)
 class Histogram:
-    """Counts by `EDGES_US` (one more class above the last), with the largest value in µs."""
+    """Counts by `EDGES_US` (one more bin above the last), with the largest value in µs."""
 
     counts: list[int]
     most_us: float = 0.0
 
     @classmethod
     def empty(cls) -> Histogram:
-        """No value yet."""
+        """Return a histogram without values."""
         return cls([0] * (len(EDGES_US) + 1))
 
     def add(self, value_us: float) -> None:
@@ -48,7 +47,7 @@ class Histogram:
         self.most_us = max(self.most_us, value_us)
 
     def below_us(self, share: float) -> float:
-        """The end of the class below which this share of the values lies."""
+        """Return the edge of the bin below which this share of the values lies [µs]."""
         wanted, seen = share * sum(self.counts), 0
         for count, edge in zip(self.counts, EDGES_US, strict=False):
             seen += count
@@ -59,7 +58,7 @@ class Histogram:
 
 @dataclass(slots=True)
 class Measured:
-    """One run. ``missed`` cycles were over before thread and frame were through."""
+    """One run. A cycle is ``missed`` if it ended before thread and frame were done."""
 
     period_us: int
     cycles: int
@@ -68,14 +67,15 @@ class Measured:
     memory_locked: bool
     lateness: Histogram
     round_trip: Histogram | None
-    """None where no interface was named or nothing answered."""
+    """None if no interface was given or nothing answered."""
     unanswered: int = 0
 
 
 def missed_bound(missed: int, cycles: int) -> float:
-    """One-sided 95 % bound of the share (Wilson's score with continuity, conservative at 0).
+    """Return the one-sided 95 % upper bound of the share of missed cycles.
 
-    With none missed it is the rule of three, 3 / cycles (Hanley and Lippman-Hand 1983).
+    Wilson's score with continuity correction; with none missed, the rule of three, 3 / cycles
+    (Hanley and Lippman-Hand 1983).
     """
     if cycles <= 0:
         return 1.0
@@ -89,7 +89,7 @@ def missed_bound(missed: int, cycles: int) -> float:
 
 
 def from_json(text: str) -> Measured:
-    """What the process has printed."""
+    """Parse the output of the process."""
     found = json.loads(text)
     found["lateness"] = Histogram(**found["lateness"])
     found["round_trip"] = Histogram(**found["round_trip"]) if found["round_trip"] else None
@@ -97,7 +97,7 @@ def from_json(text: str) -> Measured:
 
 
 def broadcast_read(index: int) -> bytes:
-    """An Ethernet frame with one BRD datagram of 2 bytes at 0000h (ETG.1000.4, clause 5.4.1)."""
+    """Return an Ethernet frame with one BRD of 2 bytes at 0000h (ETG.1000.4, clause 5.4.1)."""
     datagram = struct.pack("<BBHHHH", 7, index & 0xFF, 0, 0, 2, 0) + bytes(2) + bytes(2)
     header = struct.pack("<H", len(datagram) | 1 << 12)
     frame = b"\xff" * 6 + b"\x02\x00\x00\x00\x00\x01" + struct.pack(">H", _ETH_P_ECAT)
@@ -114,7 +114,7 @@ class Wire:
         self._index = 0
 
     def round_trip_us(self, until: float) -> float | None:
-        """Time until the frame of this call is back; None where it is not by ``until``."""
+        """Return the time until the frame of this call is back; None if it is not by ``until``."""
         self._index = (self._index + 1) & 0xFF
         sent = time.monotonic()
         self._socket.send(broadcast_read(self._index))
@@ -122,17 +122,17 @@ class Wire:
             if not select.select((self._socket,), (), (), left)[0]:
                 return None
             frame, address = self._socket.recvfrom(1600)
-            # What goes out is seen as well (PACKET_OUTGOING, packet(7)).
+            # Outgoing frames are received as well (PACKET_OUTGOING, packet(7)).
             if address[2] != 4 and len(frame) > 17 and frame[17] == self._index:
                 return (time.monotonic() - sent) * 1e6
         return None
 
 
 def measure(period_us: int, seconds: float, interface: str = "") -> Measured:
-    """Wake up at each period and note how late.
+    """Wake up once per period and record the delay.
 
     Raises:
-        OSError: the interface cannot be used: no such one, or no permission.
+        OSError: the interface cannot be used: it does not exist, or is not permitted.
     """
     granted = realtime.claim()
     wire = Wire(interface) if interface else None
@@ -165,13 +165,13 @@ def measure(period_us: int, seconds: float, interface: str = "") -> Measured:
                 used_us, in_a_row = late_us + trip, 0
         measured.cycles += 1
         measured.missed += used_us > period_us
-        # A cycle that is over is not made up for: the next one is on the grid again.
+        # A missed cycle is not made up for: the next one is on the grid again.
         due += max(0.0, math.floor((time.monotonic() - due) / period) * period)
     return measured
 
 
 def _without_wire(tried: Measured, period_us: int, seconds: float) -> Measured:
-    """Nothing answers on the wire: the lateness alone."""
+    """Measure the lateness alone, as nothing answers on the wire."""
     measured = measure(period_us, seconds)
     measured.unanswered = tried.unanswered
     return measured

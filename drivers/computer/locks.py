@@ -1,4 +1,4 @@
-"""Locks on files that go with the process that holds them, however it ends."""
+"""Locks on files that end with the process that holds them, however it ends."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if sys.platform == "win32":
 else:
     import fcntl
 
-#: Locked on Windows, which has no lock of a file as a whole: far behind any content, as a locked
-#: byte cannot be read by others.
+#: Byte locked on Windows, which cannot lock a whole file: far behind any content, as a locked byte
+#: cannot be read by others.
 _LOCKED_BYTE = 1 << 30
 
 
 def open_lock_file(path: Path) -> int:
-    """The descriptor of a file to lock, made where it is not there; no child process inherits it.
+    """Open or create a file to lock; return its descriptor, which no child process inherits.
 
     Raises:
         OSError: it cannot be opened for writing.
@@ -30,9 +30,9 @@ def open_lock_file(path: Path) -> int:
 
 
 def try_lock(descriptor: int) -> bool:
-    """Lock an open file for this process alone; False while another one has it.
+    """Lock an open file for this process alone; return False while another one holds it.
 
-    It ends with the descriptor: flock(2), and `msvcrt.locking` on Windows.
+    The lock ends with the descriptor: flock(2), and `msvcrt.locking` on Windows.
     """
     if sys.platform == "win32":
         os.lseek(descriptor, _LOCKED_BYTE, os.SEEK_SET)
@@ -50,13 +50,12 @@ def try_lock(descriptor: int) -> bool:
 
 
 def hold_file(name: str) -> BinaryIO:
-    """Hold a name for this process alone by a locked file in the folder for temporary files, until
-    the file is closed.
+    """Hold a name for this process alone by a locked temporary file, until the file is closed.
 
-    Names of adapters have characters that no file may have, so the file has their digest.
+    Adapter names contain characters that file names must not, so the file is named by a digest.
 
     Raises:
-        OSError: another process holds it, or the file cannot be made.
+        OSError: another process holds it, or the file cannot be created.
     """
     digest = hashlib.sha256(name.encode()).hexdigest()[:32]
     descriptor = open_lock_file(Path(tempfile.gettempdir()) / f"servodeck-{digest}.lock")

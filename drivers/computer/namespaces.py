@@ -1,6 +1,6 @@
-"""Namespaces of Linux: entering those of another process, and making new ones.
+"""Linux namespaces: entering those of another process, and creating new ones.
 
-Nothing heavy is imported: a namespace can be changed only while there is one thread.
+Only light modules are imported: a namespace can be changed only while there is one thread.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 
 _CLONE_NEWUSER = 0x10000000
 _CLONE_NEWNET = 0x40000000
-#: True where the system has network namespaces at all.
+#: Whether the system has network namespaces.
 AVAILABLE = sys.platform == "linux"
 
 
@@ -21,7 +21,7 @@ def enter_namespaces(pid: int) -> None:
     """Move this process into the user and network namespace of ``pid``.
 
     Raises:
-        OSError: not permitted, more than one thread, or no such process; ``filename`` says which
+        OSError: not permitted, more than one thread, or no such process; ``filename`` states which
             namespace.
     """
     libc = ctypes.CDLL(None, use_errno=True)
@@ -39,7 +39,7 @@ def enter_namespaces(pid: int) -> None:
 
 
 def leave_namespaces() -> None:
-    """New user and network namespace; with root and no user namespaces, the network alone.
+    """Create a new user and network namespace; without user namespaces, as root, the network only.
 
     Raises:
         OSError: the system forbids both.
@@ -48,7 +48,7 @@ def leave_namespaces() -> None:
         libc = ctypes.CDLL(None, use_errno=True)
         uid, gid = os.geteuid(), os.getegid()
         if libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET) == 0:
-            # The kernel needs setgroups denied before an ordinary user may map a group.
+            # The kernel requires that setgroups is denied before an ordinary user may map a group.
             Path("/proc/self/setgroups").write_text("deny", encoding="ascii")
             Path("/proc/self/uid_map").write_text(f"0 {uid} 1", encoding="ascii")
             Path("/proc/self/gid_map").write_text(f"0 {gid} 1", encoding="ascii")
@@ -61,7 +61,7 @@ def leave_namespaces() -> None:
 
 
 def disable_ipv6(interface: str) -> None:
-    """No IPv6 on an interface of this namespace; a kernel without IPv6 refuses, as good."""
+    """Disable IPv6 on an interface of this namespace; no effect in a kernel without IPv6."""
     with contextlib.suppress(OSError):
         path = Path(f"/proc/sys/net/ipv6/conf/{interface}/disable_ipv6")
         path.write_text("1", encoding="ascii")

@@ -1,11 +1,10 @@
 """EtherCAT frames where a process has no raw sockets: Npcap on Windows, bpf(4) on macOS.
 
-SOEM sends and receives through the packet capture library of the system. This module says whether
-that can be used, and which adapters there are. Npcap belongs to the computer and is never
-installed by servodeck: its licence does not allow it to be passed on.
-
-Sources: Npcap's own scripts (FixInstall.bat, CheckStatus.bat: the keys of the registry), its users'
-guide ("Restrict Npcap driver's access to Administrators only"), bpf(4) of macOS.
+SOEM sends and receives through the packet capture library of the system. This module determines
+whether that can be used, and which adapters there are. Npcap belongs to the computer and is never
+installed by servodeck: its licence does not permit redistribution. Sources: Npcap's own scripts
+(FixInstall.bat, CheckStatus.bat: the keys of the registry), its users' guide ("Restrict Npcap
+driver's access to Administrators only"), bpf(4) of macOS.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from typing import Any
 from drivers.texts.message import Text, text
 
 NPCAP_LEAST = (1, 0)
-"""The first version that its makers call stable (2020)."""
+"""The first version that its authors call stable (2020)."""
 
 _PARAMETERS = r"SYSTEM\CurrentControlSet\Services\npcap\Parameters"
 _SERVICE = r"SYSTEM\CurrentControlSet\Services\npcap"
@@ -34,10 +33,10 @@ _UNINSTALL = (
 _BPF = "/dev/bpf0"
 _DEVICE = "\\Device\\"
 NPF_NAME = re.compile(r"NPF_\{[0-9A-F]{8}(?:-[0-9A-F]{4}){3}-[0-9A-F]{12}\}", re.IGNORECASE)
-"""How Windows' adapters are named in bus URLs: the device's name without its folder."""
+"""Form of Windows adapter names in bus URLs: the device's name without its folder."""
 
 Registry = Callable[[str, str], str | int | None]
-"""A value below HKEY_LOCAL_MACHINE by key and name; None where it is not there."""
+"""A value below HKEY_LOCAL_MACHINE by key and name; None if it does not exist."""
 
 
 class Capture(StrEnum):
@@ -52,7 +51,7 @@ class Capture(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Adapter:
-    """``name`` as in bus URLs, ``device`` as SOEM opens it, ``title`` as a person knows it."""
+    """``name`` as in bus URLs, ``device`` as opened by SOEM, ``title`` for people."""
 
     name: str
     device: str
@@ -61,7 +60,7 @@ class Adapter:
 
 @dataclass(frozen=True, slots=True)
 class CaptureState:
-    """What `Capture` says, with the version of Npcap that was found; empty where unknown."""
+    """State of the packet capture library, with the version of Npcap found; empty if unknown."""
 
     capture: Capture
     version: str = ""
@@ -73,7 +72,7 @@ class CaptureState:
 
     @property
     def text(self) -> Text:
-        """The reason; only where it is not ready."""
+        """The reason; only valid if it is not ready."""
         if self.capture is Capture.NPCAP_MISSING:
             return text("computer.npcap-missing")
         if self.capture is Capture.NPCAP_TOO_OLD:
@@ -85,7 +84,7 @@ class CaptureState:
 
     @property
     def remedy(self) -> Text:
-        """What helps; only where it is not ready."""
+        """The remedy; only valid if it is not ready."""
         if self.capture in (Capture.NPCAP_MISSING, Capture.NPCAP_TOO_OLD):
             return text("computer.install-npcap")
         if self.capture is Capture.NPCAP_ADMINISTRATORS:
@@ -94,7 +93,7 @@ class CaptureState:
 
 
 def windows_registry(key: str, name: str) -> str | int | None:
-    """A value below HKEY_LOCAL_MACHINE; None where it is not there, or on another system."""
+    """Return a value below HKEY_LOCAL_MACHINE; None without it, or on another system."""
     if sys.platform == "win32":
         import winreg
 
@@ -108,9 +107,9 @@ def windows_registry(key: str, name: str) -> str | int | None:
 
 
 def npcap_state(registry: Registry, *, administrator: bool) -> CaptureState:
-    """What the registry says of Npcap.
+    """Determine the state of Npcap from the registry.
 
-    A version that the registry does not state is not judged.
+    A version that the registry does not state is accepted.
     """
     if registry(_SERVICE, "ImagePath") is None:
         return CaptureState(Capture.NPCAP_MISSING)
@@ -125,13 +124,13 @@ def npcap_state(registry: Registry, *, administrator: bool) -> CaptureState:
 
 
 def bpf_state(device: Path = Path(_BPF)) -> CaptureState:
-    """Whether this user may open the packet filter of macOS."""
+    """Determine whether this user may open the packet filter of macOS."""
     allowed = os.access(device, os.R_OK | os.W_OK)
     return CaptureState(Capture.READY if allowed else Capture.BPF_DENIED)
 
 
 def capture_state() -> CaptureState:
-    """Whether frames can be sent and received by packet capture on this computer."""
+    """Determine whether frames can be sent and received by packet capture on this computer."""
     if sys.platform == "win32":
         administrator = bool(ctypes.windll.shell32.IsUserAnAdmin())
         return npcap_state(windows_registry, administrator=administrator)
@@ -141,9 +140,9 @@ def capture_state() -> CaptureState:
 
 
 def find_library() -> None:
-    """Have Windows find the libraries of an Npcap that was installed next to no WinPcap.
+    """Make Windows find the libraries of an Npcap installed without WinPcap compatibility.
 
-    Only the mode that is compatible with WinPcap puts them into the folder that is searched.
+    Only the WinPcap-compatible mode puts them into a folder that is searched.
     """
     if sys.platform == "win32":
         folder = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "Npcap")
@@ -152,9 +151,9 @@ def find_library() -> None:
 
 
 def adapters(found: Sequence[Any] | None = None) -> list[Adapter]:
-    """The adapters that SOEM can open; none where the capture library cannot be loaded.
+    """Return the adapters that SOEM can open; empty if the capture library cannot be loaded.
 
-    ``found`` is what `pysoem.find_adapters` returned, given by tests.
+    ``found`` is the result of `pysoem.find_adapters`, set by tests.
     """
     if found is None:
         find_library()

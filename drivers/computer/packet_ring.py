@@ -2,8 +2,8 @@
 
 The kernel writes each frame with its time into a block of the shared memory and closes the block
 when it is full or ``_CLOSED_MS`` old. So the recording process does nothing per frame: it copies
-closed blocks away, a few times a second. Received one by one, 2000 frames/s took 3 % of a core,
-next to the cycle of an EtherCAT exchange.
+closed blocks a few times a second. Receiving 2000 frames/s one by one took 3 % of a core, next to
+the cycle of an EtherCAT exchange.
 
 Source: packet(7); ``Documentation/networking/packet_mmap.rst`` (TPACKET_V3) and
 ``include/uapi/linux/if_packet.h`` of Linux; filters: ``networking/filter.rst``.
@@ -24,17 +24,19 @@ _SOL_PACKET, _RX_RING, _STATISTICS, _VERSION, _TPACKET_V3 = 263, 5, 6, 10, 2
 _SO_ATTACH_FILTER = 26
 
 BLOCK_BYTES, BLOCKS = 1 << 15, 256
-"""8 MiB: at 4000 cycles/s with frames of 1500 bytes in both directions two thirds of a second;
-with few frames ``BLOCKS`` times ``_CLOSED_MS``, 7.7 s."""
+"""8 MiB: two thirds of a second at 4000 cycles/s with frames of 1500 bytes in both directions; with
+few frames ``BLOCKS`` times ``_CLOSED_MS``, 7.7 s.
+"""
 _CLOSED_MS = 30
 CLOSED_S = _CLOSED_MS / 1000
 _LONGEST = 2048
-"""Most bytes of a frame with its head, which the kernel asks for; blocks hold as many as fit."""
+"""Maximum bytes of a frame with its header, required by the kernel; blocks hold as many as fit."""
 
 _OF_KERNEL, _OF_USER, _STATUS_AT = 0, 1, 8
 _BLOCK = struct.Struct("=IIIIIIQIIII")
 """tpacket_block_desc: version, private, status, frames, first frame, bytes, number, first and last
-time in s and ns."""
+time in s and ns.
+"""
 
 
 class PacketRing:
@@ -53,7 +55,7 @@ class PacketRing:
             request = (BLOCK_BYTES, BLOCKS, _LONGEST, size // _LONGEST, _CLOSED_MS, 0, 0)
             self._socket.setsockopt(_SOL_PACKET, _RX_RING, struct.pack("=7I", *request))
             self._memory = mmap.mmap(self._socket.fileno(), size)
-            # Frames that this computer sends come only to sockets of all protocols.
+            # Frames sent by this computer are only delivered to sockets for all protocols.
             self._socket.bind((interface, _ALL))
         except OSError:
             self._socket.close()
@@ -61,14 +63,14 @@ class PacketRing:
         self._next = 0
 
     def close(self) -> None:
-        """Give the shared memory back; frames that were not taken are lost."""
+        """Release the shared memory; frames that were not taken are lost."""
         self._memory.close()
         self._socket.close()
 
     def take(self) -> Iterator[tuple[int, int, bytes]]:
-        """Closed blocks that were not yet taken.
+        """Iterate over the closed blocks not yet taken.
 
-        Of each: time of the last frame (ns, Unix), number of frames, the block (tpacket_block_desc
+        For each: time of the last frame (ns, Unix), number of frames, the block (tpacket_block_desc
         and its frames).
         """
         for _ in range(BLOCKS):
@@ -84,10 +86,10 @@ class PacketRing:
                 yield last_s * 1_000_000_000 + last_ns, frames, block
 
     def lost(self) -> int:
-        """Frames since the last call that found no room, as blocks were not taken in time.
+        """Return the frames dropped since the last call, as blocks were not taken in time.
 
         Raises:
-            OSError: the interface went down or away.
+            OSError: the interface went down or disappeared.
         """
         error = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if error:
@@ -97,12 +99,12 @@ class PacketRing:
 
 
 def _only_ethercat(wire: socket.socket) -> None:
-    """Have the kernel leave out other frames, so that they take no room."""
+    """Make the kernel filter out other frames, so that they take no room."""
     program = b"".join(
         struct.pack("=HBBI", *line)
         for line in (
             (0x28, 0, 0, 12),  # load the half word at 12, the EtherType
-            (0x15, 0, 1, _ETHERCAT),  # if it is another, pass over one line
+            (0x15, 0, 1, _ETHERCAT),  # if it differs, skip one line
             (0x06, 0, 0, 0xFFFF),  # keep up to 64 kB of the frame
             (0x06, 0, 0, 0),  # keep nothing
         )

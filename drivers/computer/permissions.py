@@ -1,7 +1,7 @@
-"""What is missing on a real interface, and the exact commands that grant it on Linux.
+"""Missing permissions for a real interface, and the exact commands that grant them on Linux.
 
 SOEM opens a raw packet socket (CAP_NET_RAW) and switches the interface to promiscuous mode
-(CAP_NET_ADMIN): both are needed. CAP_SYS_NICE and CAP_IPC_LOCK only make cycles more punctual.
+(CAP_NET_ADMIN): both are required. CAP_SYS_NICE and CAP_IPC_LOCK only improve the timing of cycles.
 Windows and macOS need a packet capture library instead: see `drivers.computer.packet_capture`.
 """
 
@@ -23,9 +23,9 @@ _IFF_UP = 1
 
 @dataclass(frozen=True, slots=True)
 class Permissions:
-    """``missing`` prevents EtherCAT, ``advised`` makes it more punctual; both capability names.
+    """``missing`` prevents EtherCAT, ``advised`` improves its timing; both capability names.
 
-    ``capture`` is why the packet capture library cannot be used, ``capture_remedy`` what helps.
+    ``capture`` is why the packet capture library cannot be used, ``capture_remedy`` the remedy.
     """
 
     interface: str
@@ -44,7 +44,7 @@ class Permissions:
 
     @property
     def text(self) -> Text:
-        """What is missing, as one message for the user."""
+        """Everything missing, as one message for the user."""
         if self.capture is not None:
             return self.capture
         if not self.exists:
@@ -61,12 +61,11 @@ class Permissions:
 
 
 def check(interface: str, *, status: str | None = None, python: str | None = None) -> Permissions:
-    """Look at the capabilities of this process and at the interface.
+    """Check the capabilities of this process and the interface.
 
-    Elsewhere than on Linux at the packet capture library and its list of adapters.
-
-    ``status`` is the text of /proc/self/status and ``python`` the interpreter's path, given only
-    by tests.
+    On systems other than Linux, check the packet capture library and its list of adapters.
+    ``status`` is the text of /proc/self/status and ``python`` the interpreter's path, set only by
+    tests.
     """
     if status is None and sys.platform != "linux":
         return captured(interface)
@@ -92,7 +91,7 @@ def check(interface: str, *, status: str | None = None, python: str | None = Non
 
 
 def captured(interface: str) -> Permissions:
-    """Look at the packet capture library, and for the adapter in its list."""
+    """Check the packet capture library, and the adapter in its list."""
     state = capture_state()
     if not state.ready:
         exists = True  # not known yet
@@ -109,7 +108,7 @@ def _effective(status: str) -> int:
 
 
 def _is_up(interface: str) -> bool:
-    """IFF_UP by ioctl: /sys shows another network namespace's interfaces."""
+    """Return IFF_UP by ioctl: /sys may show another network namespace's interfaces."""
     try:
         return bool(interface_flags(interface) & _IFF_UP)
     except OSError:

@@ -1,4 +1,4 @@
-"""Processes: distinguishing them, their turn on the processor, how they end."""
+"""Processes: identification, priority, limits and termination."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from pathlib import Path
 
 import psutil
 
-#: Whether a child process can have a session of its own, so that Ctrl+C does not reach it (not on
+#: Whether a child process can have its own session, so that Ctrl+C does not reach it (not on
 #: Windows, which has no such sessions).
 SESSIONS = sys.platform != "win32"
 _BOOT = Path("/proc/sys/kernel/random/boot_id")
-#: Fields of /proc/PID/stat behind the command's name: the 20th of these is the start time (proc(5),
+#: Index of the start time among the fields of /proc/PID/stat after the command's name (proc(5),
 #: field 22).
 _START_AFTER_NAME = 19
 
 
 def process_mark(pid: int) -> str:
-    """A mark that no other process has, before or after a restart of the computer.
+    """Return a mark that no other process has, before or after a restart of the computer.
 
-    Empty where no such process runs. On Linux number, start in ticks and boot; elsewhere number
-    and moment of start as the system noted it, which setting the clock later does not change.
+    Empty if no such process runs. On Linux number, start in ticks and boot; elsewhere number and
+    start time as recorded by the system, which a later change of the clock does not affect.
     """
     if sys.platform == "linux":
         return _mark_from_proc(pid)
@@ -36,7 +36,7 @@ def process_mark(pid: int) -> str:
 
 
 def _mark_by_psutil(pid: int) -> str:
-    """On Windows psutil asks GetProcessTimes, which keeps what it noted at the start."""
+    """Return the mark on Windows: psutil calls GetProcessTimes, which keeps the recorded start."""
     try:
         return f"{pid} {psutil.Process(pid).create_time():.6f}"
     except psutil.Error:
@@ -44,7 +44,7 @@ def _mark_by_psutil(pid: int) -> str:
 
 
 def _mark_from_ps(pid: int) -> str:
-    """By ps(1): what psutil says on macOS follows the clock when that is set."""
+    """Return the mark by ps(1): on macOS, psutil's start time follows changes of the clock."""
     fixed = {**os.environ, "LC_ALL": "C", "TZ": "UTC"}
     listed = subprocess.run(
         ["/bin/ps", "-o", "lstart=", "-p", str(pid)],
@@ -66,7 +66,7 @@ def _mark_from_proc(pid: int) -> str:
 
 
 def yield_processor(nice: int = 10) -> None:
-    """Have this process go after others: by ``nice`` steps, on Windows by one priority class."""
+    """Lower the priority of this process: ``nice`` steps, on Windows one priority class."""
     if sys.platform == "win32":
         psutil.Process().nice(psutil.BELOW_NORMAL_PRIORITY_CLASS)
         return
@@ -74,8 +74,9 @@ def yield_processor(nice: int = 10) -> None:
 
 
 def prefer_process() -> None:
-    """Raise the priority of this process: Windows' class HIGH_PRIORITY, which needs no
-    permission. Without effect elsewhere, or where it is refused.
+    """Raise the priority of this process to Windows' class HIGH_PRIORITY, without a permission.
+
+    No effect on other systems, or if it is refused.
     """
     if sys.platform == "win32":
         with contextlib.suppress(psutil.Error):
@@ -83,7 +84,7 @@ def prefer_process() -> None:
 
 
 def limit_memory(most_bytes: int) -> bool:
-    """Bound the address space of this process; False where the system cannot (Windows)."""
+    """Limit the address space of this process; return False if not possible (Windows)."""
     if sys.platform == "win32":
         return False
     import resource
@@ -91,13 +92,13 @@ def limit_memory(most_bytes: int) -> bool:
     try:
         resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
     except (OSError, ValueError):
-        # macOS refuses less than what is mapped already.
+        # macOS refuses a limit below what is already mapped.
         return False
     return True
 
 
 def raise_descriptors(wanted: int) -> None:
-    """Allow this process ``wanted`` open files, or as many as it may; Windows has no such limit."""
+    """Allow this process ``wanted`` open files, or the permitted maximum; unlimited on Windows."""
     if sys.platform == "win32":
         return
     import resource
@@ -109,14 +110,14 @@ def raise_descriptors(wanted: int) -> None:
     try:
         resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
     except (OSError, ValueError):
-        return  # fewer connections, which is said where one is refused
+        return  # fewer connections, which is reported where one is refused
 
 
 def end_within(seconds: int) -> None:
-    """Have this process end after this time, whatever it waits for (SIGALRM).
+    """End this process after this time, whatever it waits for (SIGALRM).
 
     Windows has no such alarm: a thread ends the process there, unless a library call holds the
-    interpreter; then whoever started the process ends it.
+    interpreter; then the parent process ends it.
     """
     if sys.platform == "win32":
         alarm = threading.Timer(seconds, os._exit, (1,))

@@ -1,4 +1,4 @@
-"""Asking the kernel for real-time conditions, and saying plainly what it granted."""
+"""Requesting real-time conditions from the kernel, and reporting what it granted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PRIORITY = 40
 
 @dataclass(frozen=True, slots=True)
 class RealTime:
-    """What was granted; ``notes``: what was not, and how to get it."""
+    """The conditions granted; ``notes``: those that were not, and how to get them."""
 
     fifo_priority: int
     notes: tuple[Text, ...]
@@ -27,10 +27,10 @@ class RealTime:
 
 
 def claim(*, wanted: bool = True) -> RealTime:
-    """Ask for SCHED_FIFO, locked memory and exact timers for this process.
+    """Request SCHED_FIFO, locked memory and exact timers for this process.
 
-    Nothing here is needed for function: without it single cycles come late and are counted.
-    Note that a SCHED_FIFO thread may never spin: the kernel throttles it for 50 ms a second.
+    None of these is required for operation: without them single cycles are late and are counted. A
+    SCHED_FIFO thread must never spin: the kernel throttles it for 50 ms a second.
     """
     if not wanted:
         return RealTime(0, notes=(text("computer.real-time-not-asked"),))
@@ -48,7 +48,7 @@ def claim(*, wanted: bool = True) -> RealTime:
     else:
         prefer_process()
         notes.append(text("computer.no-real-time-here"))
-    # A pause of the garbage collector is a late cycle; the loop creates no reference cycles.
+    # A pause of the garbage collector makes a cycle late; the loop creates no reference cycles.
     scheduling.spare_collector()
     gc.disable()
     sys.setswitchinterval(1e-4)
@@ -56,9 +56,9 @@ def claim(*, wanted: bool = True) -> RealTime:
 
 
 def die_with_parent() -> None:
-    """Have SIGTERM sent to this process when its parent dies; the pipe's end shows as well.
+    """Make the kernel send SIGTERM to this process when its parent dies.
 
-    Linux alone has that; elsewhere the pipe's end is what shows it.
+    Only on Linux; elsewhere the closed pipe shows the parent's end, as it does on Linux too.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)

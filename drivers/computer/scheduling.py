@@ -1,4 +1,4 @@
-"""When the kernel lets a thread run: what anybody may ask for, and what needs a permission.
+"""Scheduling of threads by the kernel: requests with and without a permission.
 
 Source: sched(7), prctl(2); slices of fair tasks: Linux 6.12, ``kernel/sched/syscalls.c``.
 """
@@ -12,11 +12,11 @@ import platform
 import sys
 
 VIRTUAL_PRIORITY = "SERVODECK_VIRTUAL_PRIORITY"
-"""Environment variable with the SCHED_FIFO priority of processes that stand for hardware."""
+"""Environment variable with the SCHED_FIFO priority of processes that emulate hardware."""
 _PR_SET_TIMERSLACK = 29
 _SYS_SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274}
 SHORT_SLICE_NS = 100_000
-"""The least that the kernel gives."""
+"""The shortest slice that the kernel grants [ns]."""
 
 
 class _SchedAttr(ctypes.Structure):
@@ -35,8 +35,10 @@ class _SchedAttr(ctypes.Structure):
 
 
 def fine_timers() -> None:
-    """Let sleeps end on time: Linux groups those of a thread by 50 µs otherwise, and Windows ends
-    the waits of a process with its timer, every 15.6 ms (timeBeginPeriod: every millisecond).
+    """Make sleeps end on time.
+
+    Otherwise Linux groups those of a thread by 50 µs, and Windows ends the waits of a process with
+    its timer, every 15.6 ms (timeBeginPeriod: every millisecond).
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
@@ -45,9 +47,9 @@ def fine_timers() -> None:
 
 
 def real_time(priority: int) -> bool:
-    """SCHED_FIFO for this process; False where that is not permitted.
+    """Request SCHED_FIFO for this process; return False if not permitted.
 
-    A thread that has it may never spin: the kernel throttles it for 50 ms a second.
+    A thread with SCHED_FIFO must never spin: the kernel throttles it for 50 ms a second.
     """
     if sys.platform != "linux":
         return False
@@ -59,22 +61,22 @@ def real_time(priority: int) -> bool:
 
 
 def virtual_priority() -> bool:
-    """SCHED_FIFO for a process that stands for hardware, where the environment asks for it.
+    """Request SCHED_FIFO for a process that emulates hardware, if the environment requires it.
 
-    A real drive answers however busy the engineer's computer is. `VIRTUAL_PRIORITY` is set where
-    other work shares the computer with the virtual drives, as in the tests. False where nothing
-    is asked for, the value is no priority, or the system does not permit it.
+    A real drive answers however busy the computer is. `VIRTUAL_PRIORITY` is set where other work
+    shares the computer with the virtual drives, as in the tests. Returns False if it is not set,
+    its value is not a priority, or the system does not permit it.
     """
     asked = os.environ.get(VIRTUAL_PRIORITY, "")
     return asked.isdecimal() and 0 < int(asked) < 100 and real_time(int(asked))
 
 
 def short_slice() -> bool:
-    """Ask for short turns, and so to get them soon: needs no permission.
+    """Request short slices, and thus an early start; needs no permission.
 
-    A waking task then goes before one with longer turns that runs (PREEMPT_SHORT), instead of
-    waiting for the end of that one's turn, which is up to 3 ms. Its share of the processor stays
-    the same. False where the kernel does not know of it, or this task is not an ordinary one.
+    A waking task then preempts a running one with longer slices (PREEMPT_SHORT), instead of waiting
+    for the end of its slice, which is up to 3 ms. Its share of the processor is unchanged. False if
+    the kernel does not support it, or this task is not an ordinary one.
     """
     if sys.platform != "linux":
         return False
@@ -93,10 +95,10 @@ def short_slice() -> bool:
 
 
 def spare_collector() -> None:
-    """Take what is alive now out of the garbage collector's sight, for good.
+    """Exclude all present objects from garbage collection permanently.
 
-    For the end of a long process' start: modules, profiles and routes stay anyway, and looking
-    through all of them again and again is a pause of a tenth of a second each time.
+    For the end of a long start of a process: modules, profiles and routes stay alive anyway, and
+    each scan of all of them is a pause of a tenth of a second.
     """
     gc.collect()
     gc.freeze()

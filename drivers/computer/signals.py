@@ -1,4 +1,4 @@
-"""Signals: how the system or a person at the terminal asks a process to end."""
+"""Signals: requests of the system or of a person at the terminal to end a process."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from contextlib import contextmanager
 
 
 def ignore_interrupt() -> None:
-    """Ctrl+C in the terminal is not for this process: its parent ends it in good order."""
+    """Ignore Ctrl+C in the terminal: the parent ends this process in an orderly way."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def on_termination(act: Callable[[], None]) -> None:
-    """Call this at the end that a service manager asks for (SIGTERM)."""
+    """Call this when a service manager ends the process (SIGTERM)."""
     signal.signal(signal.SIGTERM, lambda _number, _frame: act())
 
 
 def termination_interrupts() -> None:
-    """A service manager's end is as orderly as Ctrl+C: both raise KeyboardInterrupt."""
+    """Make SIGTERM of a service manager raise KeyboardInterrupt, as Ctrl+C does."""
 
     def end() -> None:
         raise KeyboardInterrupt
@@ -30,9 +30,9 @@ def termination_interrupts() -> None:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Within it Ctrl+C and SIGTERM both raise KeyboardInterrupt; afterwards all is as before.
+    """Make Ctrl+C and SIGTERM raise KeyboardInterrupt within the block; then restore both.
 
-    Also where SIGINT is ignored, as it is for what a shell starts in the background.
+    Also where SIGINT is ignored, as in processes that a shell starts in the background.
     """
     interrupt = signal.signal(signal.SIGINT, signal.default_int_handler)
     before = signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
@@ -44,10 +44,10 @@ def interruptible() -> Iterator[None]:
 
 
 async def until_asked_to_end() -> None:
-    """Wait for Ctrl+C or for the end that a service is given (SIGTERM)."""
+    """Wait for Ctrl+C or for SIGTERM."""
     over, loop = asyncio.Event(), asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
-        # Windows' event loop takes no handlers: there a signal is passed on to it.
+        # Windows' event loop accepts no handlers: there a signal is passed on to it.
         if sys.platform == "win32":
             signal.signal(number, lambda *_: loop.call_soon_threadsafe(over.set))
         else:

@@ -1,4 +1,4 @@
-"""Sockets and descriptors that one system has and another has not."""
+"""Sockets and descriptors that are not available on every system."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from typing import BinaryIO
 from drivers.computer.locks import hold_file
 from drivers.errors import NotAllowed
 
-#: Whether a process can send and receive Ethernet frames of its own by a socket (packet(7)).
+#: Whether a process can send and receive its own Ethernet frames through a socket (packet(7)).
 #: Elsewhere EtherCAT goes through SOEM alone, over a packet capture library.
 RAW_FRAMES = sys.platform == "linux"
 
 if sys.platform == "linux":
     from socket import AF_NETLINK, AF_PACKET, AF_UNIX, MSG_DONTWAIT, NETLINK_ROUTE
 else:
-    # By Linux' numbers (bits/socket.h). Nothing opens them elsewhere: see `RAW_FRAMES`.
+    # Numbers of Linux (bits/socket.h). They are never opened elsewhere: see `RAW_FRAMES`.
     AF_UNIX, AF_NETLINK, AF_PACKET, MSG_DONTWAIT, NETLINK_ROUTE = 1, 16, 17, 0x40, 0
 
 _SIOCGIFFLAGS, _SIOCSIFFLAGS = 0x8913, 0x8914
@@ -33,7 +33,7 @@ __all__ = [
 
 
 def require_linux(what: str) -> None:
-    """Some things are to be had on Linux only.
+    """Require Linux for ``what``.
 
     Raises:
         NotAllowed: another system.
@@ -45,16 +45,16 @@ def require_linux(what: str) -> None:
 
 
 def set_blocking(descriptor: int, wanted: bool) -> None:
-    """Have reading this descriptor wait or not; without effect on Windows."""
+    """Set whether reading this descriptor waits; no effect on Windows."""
     if sys.platform != "win32":
         os.set_blocking(descriptor, wanted)
 
 
 def shared_memory_file(name: str) -> int:
-    """A file in memory that vanishes with the last process that holds it (memfd_create(2)).
+    """Create a file in memory that vanishes with the last process holding it (memfd_create(2)).
 
     Raises:
-        NotAllowed: the system has none.
+        NotAllowed: the system does not support it.
     """
     if sys.platform == "linux":
         return os.memfd_create(name)
@@ -64,10 +64,10 @@ def shared_memory_file(name: str) -> int:
 def receive_with_notes(
     source: socket.socket, most: int, notes: int
 ) -> tuple[bytes, list[tuple[int, int, bytes]], int, object]:
-    """A message with its ancillary data (recvmsg(2)).
+    """Receive a message with its ancillary data (recvmsg(2)).
 
     Raises:
-        OSError: nothing there, or the system has no such call (Windows).
+        OSError: nothing to receive, or the system has no such call (Windows).
     """
     if sys.platform == "win32":
         raise OSError("recvmsg is not available on Windows")
@@ -76,10 +76,10 @@ def receive_with_notes(
 
 
 def interface_flags(interface: str) -> int:
-    """The IFF_ flags of a network interface (netdevice(7)).
+    """Return the IFF_ flags of a network interface (netdevice(7)).
 
     Raises:
-        OSError: there is none of this name, or the system does not say (not Linux).
+        OSError: there is no such interface, or the system does not report them (not Linux).
     """
     return _flags_by(_SIOCGIFFLAGS, interface, 0)
 
@@ -88,7 +88,7 @@ def set_interface_flags(interface: str, flags: int) -> None:
     """Set the IFF_ flags of a network interface (netdevice(7)).
 
     Raises:
-        OSError: not permitted, none of this name, or another system than Linux.
+        OSError: not permitted, no such interface, or another system than Linux.
     """
     _flags_by(_SIOCSIFFLAGS, interface, flags)
 
@@ -105,11 +105,11 @@ def _flags_by(request: int, interface: str, flags: int) -> int:
 
 
 def hold_name(name: str) -> socket.socket | BinaryIO:
-    """What holds this name for this process alone, and goes with the process.
+    """Hold this name for this process alone; return what holds it until the process ends.
 
-    On Linux an abstract socket (unix(7)), which belongs to the network namespace as its interfaces
-    do. Elsewhere a locked file in the user's folder for temporary files: another user's process
-    is not seen there.
+    On Linux an abstract socket (unix(7)), which belongs to the network namespace, as its interfaces
+    do. Elsewhere a locked file in the user's temporary folder, which does not exclude processes of
+    other users.
 
     Raises:
         OSError: another process holds it.
@@ -126,7 +126,7 @@ def hold_name(name: str) -> socket.socket | BinaryIO:
 
 
 def open_sockets() -> set[int]:
-    """The descriptors of this process that are sockets; Linux alone lists them (proc(5))."""
+    """Return the descriptors of this process that are sockets; only Linux lists them (proc(5))."""
     found = set()
     for entry in Path("/proc/self/fd").iterdir():
         try:

@@ -1,4 +1,4 @@
-"""Serial ports as the system's terminals: their errors, and how soon they deliver."""
+"""Serial ports as terminals of the system: errors, latency, pseudo-terminals and speeds."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ if sys.platform != "win32":
         for name in dir(termios)
         if name[0] == "B" and name[1:].isdigit()
     }
-    #: No OSError: pyserial lets it through where it sets up a terminal that has just gone.
+    #: Not an OSError: pyserial lets it through when it sets up a terminal that has just
+    #: disappeared.
     TERMINAL_ERRORS = (termios.error,)
 else:
     TERMINAL_ERRORS = ()
 
-#: Rates that Linux has (asm-generic/termbits.h) and Python's termios does not name.
+#: Rates of Linux (asm-generic/termbits.h) without a name in Python's termios.
 _LINUX_SPEEDS = {
     0o010005: 500_000, 0o010006: 576_000, 0o010007: 921_600, 0o010010: 1_000_000,
     0o010011: 1_152_000, 0o010012: 1_500_000, 0o010013: 2_000_000, 0o010014: 2_500_000,
@@ -37,7 +38,7 @@ _LINUX_SPEEDS = {
 
 
 def flush(port: serial.Serial) -> bool:
-    """Wait until everything is on the line; False where a signal of this process broke it off.
+    """Wait until everything has been sent; return False if a signal interrupted the wait.
 
     Python does not repeat tcdrain(3) by itself, as it does with most calls (PEP 475).
 
@@ -54,10 +55,10 @@ def flush(port: serial.Serial) -> bool:
 
 
 def deliver_soon(port: serial.Serial) -> bool:
-    """Have the adapter hand over at once what it has (ASYNC_LOW_LATENCY); False where it cannot.
+    """Make the adapter deliver data at once (ASYNC_LOW_LATENCY); return False if it cannot.
 
-    USB chips hold answers back for up to 16 ms otherwise. Pseudo-terminals cannot be asked, macOS
-    knows no such setting; on Windows it is one of the device (latency timer, Device Manager).
+    Otherwise USB chips hold answers back for up to 16 ms. Pseudo-terminals do not support it, macOS
+    has no such setting; on Windows it is a device setting (latency timer, Device Manager).
     """
     if sys.platform != "linux":
         return False
@@ -69,7 +70,7 @@ def deliver_soon(port: serial.Serial) -> bool:
 
 
 def own_terminals() -> set[str]:
-    """The terminals that this process itself was started in; Windows knows none by name."""
+    """Return the terminals in which this process was started; empty on Windows."""
     found: set[str] = set()
     if sys.platform != "win32":
         for descriptor in (0, 1, 2):
@@ -79,15 +80,15 @@ def own_terminals() -> set[str]:
 
 
 def port_options() -> dict[str, bool]:
-    """What pyserial is asked for next to the line's settings: the port for this process alone.
+    """Return pyserial's options besides the line settings: exclusive use of the port.
 
-    A COM port always is; pyserial refuses to be asked for it there.
+    A COM port is always exclusive; pyserial rejects the option there.
     """
     return {} if sys.platform == "win32" else {"exclusive": True}
 
 
 def has_descriptor() -> bool:
-    """Whether a serial port is a file descriptor that can be waited for (not on Windows)."""
+    """Return whether a serial port is a descriptor that can be waited for (not on Windows)."""
     return sys.platform != "win32"
 
 
@@ -112,16 +113,16 @@ class Readiness:
             self._writable = _poll(descriptor, select.POLLOUT)
 
     def readable(self, timeout_s: float) -> bool:
-        """Whether there is something to read within this time."""
+        """Return whether there is something to read within this time."""
         return bool(self._readable(max(0.0, timeout_s) * 1000))
 
     def writable(self, timeout_s: float) -> bool:
-        """Whether it takes something within this time."""
+        """Return whether data can be written within this time."""
         return bool(self._writable(max(0.0, timeout_s) * 1000))
 
 
 def require_pseudo_terminals() -> None:
-    """Virtual serial drives need them.
+    """Require pseudo-terminals, which virtual serial drives need.
 
     Raises:
         NotAllowed: the system has none (Windows).
@@ -131,7 +132,7 @@ def require_pseudo_terminals() -> None:
 
 
 def open_pair() -> tuple[int, int]:
-    """A raw pseudo-terminal: its master and slave end; see `require_pseudo_terminals`.
+    """Open a raw pseudo-terminal; return its master and slave end.
 
     Raises:
         NotAllowed: the system has none (Windows).
@@ -145,7 +146,7 @@ def open_pair() -> tuple[int, int]:
 
 
 def terminal_name(descriptor: int) -> str:
-    """The path of a terminal; empty on Windows, which knows none by name."""
+    """Return the path of a terminal; empty on Windows, where it has none."""
     if sys.platform == "win32":
         return ""
     else:  # noqa: RET505 - type checkers follow the branches of a system
@@ -153,7 +154,7 @@ def terminal_name(descriptor: int) -> str:
 
 
 def output_speed(descriptor: int) -> int | None:
-    """The baud rate that a terminal is set to; None where the system has no name for it."""
+    """Return the baud rate set in a terminal; None if the system has no name for it."""
     if sys.platform == "win32":
         return None
     else:  # noqa: RET505 - type checkers follow the branches of a system

@@ -1,1 +1,1 @@
-"""Conformance of a slave: rules of the public standards, tried over its own bus."""
+"""Conformance of a slave: rules of the public standards, tested over its own bus."""

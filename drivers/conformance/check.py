@@ -1,4 +1,4 @@
-"""All rules on one slave. It is never enabled, and what is changed is restored."""
+"""Test of all rules on one slave. It is never enabled, and all changes are restored."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _POWERED = frozenset({0x27, 0x07, 0x0F})
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What one rule came to."""
+    """The outcome of one rule."""
 
     rule: Rule
     outcome: Outcome
@@ -39,13 +39,13 @@ class Finding:
 async def check(
     subject: Subject, rules: Sequence[Rule] = RULES, shown: Callable[[int], None] = lambda _n: None
 ) -> list[Finding]:
-    """Try ``rules`` one after the other; ``shown`` is called with the number of those done.
+    """Test ``rules`` one after the other; ``shown`` is called with the number of those done.
 
     A drive that may be powered is only read: rules that write are not tested then.
 
     Raises:
         LinkLost: the bus or the slave is gone.
-        LinkTimeout: the slave answers nothing at all.
+        LinkTimeout: the slave does not answer at all.
     """
     powered = await _power(subject)
     found = []
@@ -56,7 +56,7 @@ async def check(
 
 
 async def _power(subject: Subject) -> Fact | None:
-    """The status word where power is on, or may be; it is also the first sign of life."""
+    """Return the status word if power is or may be on; this also checks that the slave answers."""
     try:
         status = await subject.number(0x6041)
     except (Rejected, ProtocolError):

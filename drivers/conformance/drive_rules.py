@@ -1,8 +1,8 @@
 """Drive profile: device type, control and status word, modes of operation.
 
 Sources: CiA 402-2 (IEC 61800-7-201), clause 8.4 (control and status word) and the objects of the
-modes; ETG.6010 (their use on EtherCAT). The words that move an axis are not written: transitions of
-the state machine are not tried.
+modes; ETG.6010 (their use on EtherCAT). Control words that move an axis are not written:
+transitions of the state machine are not tested.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ _OF_A_MODE: dict[int, tuple[int, ...]] = {
     9: (0x60FF, 0x606C),
     10: (0x6071, 0x6077),
 }
-"""Setpoint and actual value that the tables of the modes call mandatory."""
+"""Setpoint and actual value that are mandatory for each mode according to its tables."""
 
 
 async def is_drive(subject: Subject) -> bool:
-    """It has the status word of a drive."""
+    """Return whether the slave has the status word of a drive."""
     return await subject.read_if_there(_STATUS) is not None
 
 
 async def _device_type(subject: Subject) -> Outcome:
-    """The low word of 1000h is the number of the device profile (CiA 301 clause 7.5.2.1)."""
+    """Check that the low word of 1000h is the device profile number (CiA 301 clause 7.5.2.1)."""
     if not await is_drive(subject):
         return not_applicable(Fact("object_6041", "-"))
     profile = (await subject.number(0x1000) or 0) & 0xFFFF
@@ -72,12 +72,12 @@ async def _state(subject: Subject) -> Outcome:
 
 
 async def _modes(subject: Subject) -> int | None:
-    """Modes by 6502h as a bit field, bit 0 for mode 1."""
+    """Read the modes in 6502h as a bit field, bit 0 for mode 1."""
     return await subject.number(_MODES)
 
 
 async def _mode_shown(subject: Subject) -> Outcome:
-    """6061h is no mode, or one that 6502h lists; modes of the maker are negative."""
+    """Check that 6061h is no mode or one listed in 6502h; manufacturer's modes are negative."""
     if not await is_drive(subject):
         return not_applicable(Fact("object_6041", "-"))
     data = await subject.read_if_there(_MODE_SHOWN)
@@ -91,7 +91,7 @@ async def _mode_shown(subject: Subject) -> Outcome:
 
 
 async def _mode_objects(subject: Subject) -> Outcome:
-    """Objects of each mode of 6502h, which is itself only mandatory with several modes."""
+    """Check the objects of each mode in 6502h, itself only mandatory with several modes."""
     if not await is_drive(subject):
         return not_applicable(Fact("object_6041", "-"))
     modes = await _modes(subject)

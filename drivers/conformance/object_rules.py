@@ -1,4 +1,4 @@
-"""Mandatory objects of the communication profile, and that they agree with one another.
+"""Mandatory objects of the communication profile, and their consistency.
 
 Sources: CiA 301 v4.2.0 clauses 7.5.2 (objects) and 7.2.8.2.2 (error control); ETG.1000.6 clause
 5.6.7 (objects of CoE, sync managers, PDO assignment).
@@ -22,7 +22,7 @@ from drivers.errors import Rejected
 _MAILBOX_OUT, _MAILBOX_IN, _OUTPUTS, _INPUTS = 1, 2, 3, 4
 _SYNC_MANAGER_KINDS = (_MAILBOX_OUT, _MAILBOX_IN, _OUTPUTS, _INPUTS)
 _DUMMIES = range(0x0001, 0x0020)
-"""Mapped data types stand for gaps (CiA 301, dummy entries); index 0 does on EtherCAT."""
+"""Mapped data types are gaps (CiA 301, dummy entries); so is index 0 on EtherCAT."""
 
 
 def _sized(name: str, data: bytes | None, size: int) -> Outcome:
@@ -40,7 +40,7 @@ async def _error_register(subject: Subject) -> Outcome:
 
 
 async def _identity(subject: Subject) -> Outcome:
-    """Vendor, product, revision and serial number: as many as subindex 0 says, of four bytes."""
+    """Check vendor, product, revision and serial number: as many as in subindex 0, 4 bytes each."""
     count = await subject.number(0x1018)
     if count is None or not 1 <= count <= 4:
         return failed(Fact("object_1018:00", "-" if count is None else count, "1…4"))
@@ -54,7 +54,7 @@ async def _identity(subject: Subject) -> Outcome:
 
 
 async def _error_control(subject: Subject) -> Outcome:
-    """Heartbeat or node guarding: one of both is mandatory."""
+    """Check that heartbeat or node guarding is present: one of them is mandatory."""
     heartbeat = await subject.read_if_there(0x1017)
     if heartbeat is not None:
         return _sized("object_1017", heartbeat, 2)
@@ -63,7 +63,7 @@ async def _error_control(subject: Subject) -> Outcome:
 
 
 async def _stored_identity(subject: Subject) -> Outcome:
-    """The EEPROM and the firmware name the same product."""
+    """Check that EEPROM and firmware state the same product."""
     found = subject.found
     stored = (None, None) if found is None else (found.vendor_id, found.product_code)
     if None in stored:
@@ -91,7 +91,7 @@ async def _sync_manager_kinds(subject: Subject) -> Outcome:
 
 
 async def _assignment(subject: Subject) -> Outcome:
-    """Each assigned PDO can be read, and each object in it exists, unless it fills a gap."""
+    """Check that each assigned PDO is readable and its objects exist, except for gaps."""
     facts: list[Fact] = []
     for assigned in (0x1C12, 0x1C13):
         count = await subject.number(assigned)
@@ -109,7 +109,7 @@ async def _assignment(subject: Subject) -> Outcome:
 
 
 async def _missing(subject: Subject, pdo: int) -> Fact | None:
-    """What is named in the mapping and not there."""
+    """Return the first object of the mapping that is missing."""
     count = await subject.number(pdo)
     if count is None:
         return Fact(f"object_{pdo:04X}", "-")
@@ -123,7 +123,7 @@ async def _missing(subject: Subject, pdo: int) -> Fact | None:
         try:
             await subject.read(index, subindex)
         except Rejected as refusal:
-            # What can only be written is there; what does not exist has a code of its own.
+            # A write-only object exists; a missing object has an abort code of its own.
             if refusal.abort_code in ABSENT:
                 return Fact(f"object_{index:04X}:{subindex:02X}", hexadecimal(refusal.abort_code))
     return None

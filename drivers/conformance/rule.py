@@ -1,4 +1,4 @@
-"""A rule of a standard, and what came out of trying it."""
+"""A rule of a standard, and the outcome of its test."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from profiles.schema import LinkKind
 
 
 class Verdict(Enum):
-    """What came out."""
+    """Verdict of a test."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -36,40 +36,40 @@ _VERDICTS = {
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A verdict with the figures that it rests on."""
+    """A verdict with the figures on which it is based."""
 
     verdict: Verdict
     facts: tuple[Fact, ...] = ()
 
 
 def passed(*facts: Fact) -> Outcome:
-    """The slave does what the clause prescribes."""
+    """The slave complies with the clause."""
     return Outcome(Verdict.PASSED, facts)
 
 
 def failed(*facts: Fact) -> Outcome:
-    """It does not; ``facts`` show what it does."""
+    """The slave does not comply; ``facts`` show its behaviour."""
     return Outcome(Verdict.FAILED, facts)
 
 
 def judged(well: bool, *facts: Fact) -> Outcome:
-    """`passed` or `failed`."""
+    """Return `passed` or `failed`."""
     return (passed if well else failed)(*facts)
 
 
 def not_applicable(*facts: Fact) -> Outcome:
-    """The clause is about something that this slave does not have."""
+    """The clause concerns something that this slave does not have."""
     return Outcome(Verdict.NOT_APPLICABLE, facts)
 
 
 def not_testable(*facts: Fact) -> Outcome:
-    """The slave cannot be brought into the situation that the clause is about."""
+    """The slave cannot be brought into the situation described in the clause."""
     return Outcome(Verdict.NOT_TESTABLE, facts)
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One clause. ``changes`` says that the slave is written to or changes its state for it."""
+    """One clause. ``changes``: testing it writes to the slave or changes its state."""
 
     code: str
     clause: str
@@ -79,10 +79,10 @@ class Rule:
 
     @property
     def title(self) -> Text:
-        """What the clause prescribes, as text."""
+        """Requirement of the clause, as text."""
         return text(self.code)
 
 
 def hexadecimal(value: int, digits: int = 8) -> str:
-    """As the standards print codes and indices."""
+    """Return the notation of codes and indices in the standards."""
     return f"{value:0{digits}X}h"

@@ -22,20 +22,20 @@ from drivers.errors import Rejected
 
 _CLAUSE = "CiA 301 7.2.4.3.17 table 22; ETG.1000.6 table 41"
 _RESERVED = 0x0FFF
-"""Last index of an area that CiA 301 reserves (0260h to 0FFFh): no slave has an object there."""
+"""Last index of an area reserved by CiA 301 (0260h to 0FFFh): no slave has an object there."""
 _NO_OBJECT, _NO_SUBINDEX, _READ_ONLY = 0x06020000, 0x06090011, 0x06010002
 _LENGTH, _TOO_LONG, _TOO_SHORT = 0x06070010, 0x06070012, 0x06070013
 _PLAIN: tuple[tuple[int, int], ...] = (
     (0x1017, 2), (0x6067, 4), (0x6065, 4), (0x6083, 4), (0x6084, 4), (0x6085, 4), (0x607C, 4),
     (0x6068, 2), (0x6066, 2), (0x605A, 2), (0x605D, 2),
 )  # fmt: skip
-"""Writable objects and their bytes (CiA 301, CiA 402-2). None of them starts a motion; what is
-written is the present value in a wrong length, so that a slave that takes it all the same keeps it.
+"""Writable objects and their bytes (CiA 301, CiA 402-2). None of them starts a motion; the present
+value is written in a wrong length, so that a slave that accepts it nevertheless keeps its value.
 """
 
 
 async def _abort_code(access: Awaitable[Any]) -> int:
-    """The abort code; 0 where the slave took the access."""
+    """Return the abort code; 0 if the slave accepted the access."""
     try:
         await access
     except Rejected as refusal:
@@ -66,7 +66,7 @@ async def _read_only(subject: Subject) -> Outcome:
 
 
 async def _plain(subject: Subject) -> tuple[int, bytes] | None:
-    """A writable object of known length that may be written by standstill."""
+    """Return a writable object of known length that may be written at standstill."""
     for index, size in _PLAIN:
         present = await subject.read_if_there(index)
         if present is not None and len(present) == size:

@@ -1,7 +1,7 @@
 """EtherCAT state machine: transitions, refusals with their AL status code, acknowledgement.
 
-Sources: ETG.1000.6 clauses 5.3 (AL status codes, table 11) and 6.4 (state machine); ETG.1020
-clause 5.3.7.2 (times). No process data are exchanged, and the slave is left in Pre-Op.
+Sources: ETG.1000.6 clauses 5.3 (AL status codes, table 11) and 6.4 (state machine); ETG.1020 clause
+5.3.7.2 (times). No process data are exchanged, and the slave is left in Pre-Op.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _INVALID_CHANGE, _UNKNOWN_STATE = 0x0011, 0x0012
 
 
 async def _to_preop(states: AlStates, station: int) -> AlAnswer:
-    """Pre-Op without an error, by Init where it is anywhere else."""
+    """Go to Pre-Op without an error, by way of Init from any other state."""
     answer = await states.request(station, _PREOP | _ERROR)
     if answer.state != _PREOP:
         await states.request(station, _INIT | _ERROR)
@@ -48,7 +48,7 @@ async def _up_and_down(subject: Subject) -> Outcome:
 
 
 async def _refused(subject: Subject, control: int, code: int) -> Outcome:
-    """In Pre-Op with the error bit and ``code``, and back without them."""
+    """Check for Pre-Op with the error bit and ``code``; then return to Pre-Op without them."""
     states = subject.states
     if states is None:
         return not_testable()
@@ -69,7 +69,7 @@ async def _unknown_state(subject: Subject) -> Outcome:
 
 
 async def _acknowledged(subject: Subject) -> Outcome:
-    """The error bit stays until it is acknowledged by bit 4 of the AL control."""
+    """Check that the error bit remains until it is acknowledged by bit 4 of the AL control."""
     states = subject.states
     if states is None:
         return not_testable()

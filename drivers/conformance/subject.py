@@ -1,4 +1,4 @@
-"""The slave that is checked, as the rules see it: objects by SDO, and AL states on EtherCAT."""
+"""The tested slave as the rules access it: objects by SDO, and AL states on EtherCAT."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class AlStates(Protocol):
     """Requests to the state machine of EtherCAT slaves."""
 
     async def request(self, station: int, control: int) -> AlAnswer:
-        """Write ``control`` to 120h, and read 130h and 134h once the slave has decided.
+        """Write ``control`` to 120h; read 130h and 134h once the slave has responded.
 
         Raises:
             Busy: the cyclic exchange runs.
@@ -44,7 +44,7 @@ class Subject:
     """One station of an opened link. Errors of all methods are those of `drivers.link.Link`."""
 
     def __init__(self, link: Link, station: int, found: Found | None = None) -> None:
-        """``found`` is what a search of the bus said of it."""
+        """``found`` is the result of a search of the bus."""
         self._link = link
         self.station = station
         self.found = found
@@ -56,11 +56,11 @@ class Subject:
         return self._link.kind
 
     async def read(self, index: int, subindex: int = 0) -> bytes:
-        """All bytes of an object as the slave sends them."""
+        """Read all bytes of an object as the slave sends them."""
         return await self._link.read(self.station, Address(index, subindex, "OCTETS"))
 
     async def read_if_there(self, index: int, subindex: int = 0) -> bytes | None:
-        """As `read`; None where the slave says that there is no such object."""
+        """Read as `read`; None if the slave reports that there is no such object."""
         try:
             return await self.read(index, subindex)
         except Rejected as refusal:
@@ -69,7 +69,7 @@ class Subject:
             raise
 
     async def number(self, index: int, subindex: int = 0) -> int | None:
-        """As `read_if_there`, as an unsigned number."""
+        """Read as `read_if_there`, as an unsigned number."""
         data = await self.read_if_there(index, subindex)
         return None if data is None else int.from_bytes(data, "little")
 

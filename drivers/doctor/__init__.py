@@ -1,1 +1,1 @@
-"""Why a drive does not reach Operational: facts read from it, and the causes that fit them."""
+"""Why a drive does not reach Operational: facts read from it, and the causes that match them."""

@@ -1,4 +1,4 @@
-"""From facts of a CANopen node to causes, the likeliest first: pure.
+"""Diagnosis of a CANopen node from facts, the most likely cause first: pure.
 
 Weights as in `drivers.doctor.diagnosis`. Sources: CiA 301 v4.2.0 (states, error control, emergency
 codes table 26, PDO parameters), CiA 402-2 clause 8.4.2 (bit 9 "remote" of 6041h).
@@ -22,7 +22,7 @@ EMERGENCY_CAUSES: dict[int, str] = {
     0x8140: "can_node_bus_off", 0x8150: "can_cob_id_collision", 0x8210: "can_pdo_length",
     0x8220: "can_pdo_length", 0x8240: "can_sync_wrong", 0x8250: "can_outputs_late",
 }  # fmt: skip
-"""Codes of the network (CiA 301 table 26); all others are the drive's own."""
+"""Emergency codes of the network (CiA 301 table 26); all others are the drive's own."""
 
 REFUSAL_CAUSES: dict[str, str] = {
     "canopen.node-bus-number-under": "can_own_number",
@@ -32,7 +32,7 @@ REFUSAL_CAUSES: dict[str, str] = {
 
 
 def diagnose(evidence: CanEvidence) -> tuple[Cause, ...]:
-    """The causes that fit, the likeliest first; none where the node is in Operational."""
+    """Return the matching causes, the most likely first; empty for a node in Operational."""
     found = ranked(_signs(evidence))
     if found or _well(evidence):
         return found
@@ -41,7 +41,7 @@ def diagnose(evidence: CanEvidence) -> tuple[Cause, ...]:
 
 
 def _well(e: CanEvidence) -> bool:
-    """In Operational; a node without heartbeat and guarding shows it by its process data."""
+    """Return whether it is in Operational; process data show this without error control."""
     if e.refused:
         return False
     return e.state == _OPERATIONAL or (e.state is None and e.pdos_wanted > 0 and not e.pdos_silent)
@@ -77,8 +77,8 @@ def _of_the_bus(e: CanEvidence) -> Iterator[Sign]:
             yield "can_other_bit_rate", 8, Fact("protocol_errors", bus.protocol_errors, 0)
             yield "can_other_bit_rate", 0, Fact("bit_rate", bus.bitrate)
         elif bus.error_passive:
-            # An adapter that reports no more than this: alone on the bus it stays error passive
-            # (ISO 11898-1 clause 8.2), with others of another bit rate it goes bus-off.
+            # The adapter reports nothing more. An adapter alone on the bus stays error passive (ISO
+            # 11898-1 clause 8.2); with others at another bit rate it goes bus-off.
             yield "can_no_acknowledge", 4, Fact("error_passive", bus.error_passive, 0)
             yield "can_other_bit_rate", 2, Fact("error_passive", bus.error_passive, 0)
         elif bus.not_sent:

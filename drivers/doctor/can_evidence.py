@@ -1,4 +1,4 @@
-"""What a CANopen node and its bus say at the moment of a refusal: typed facts, no words."""
+"""State of a CANopen node and its bus at the time of a refusal: typed facts, no words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class BusFacts:
     """The adapter and the bus. Counts are those of the examination, not since the bus was opened.
 
     ``acknowledge_errors`` and ``protocol_errors`` are error frames of these classes
-    (linux/can/error.h); ``not_sent`` are frames that the adapter could not get rid of.
+    (linux/can/error.h); ``not_sent`` are frames that the adapter could not send.
     """
 
     open: bool = True
@@ -28,10 +28,11 @@ class BusFacts:
 class CanEvidence:
     """Facts of one node. Times in s; None: not read, or the node does not have it.
 
-    ``answers`` counts the answers to one question, more than one are of several nodes.
-    ``refused_key`` is the object that a start of the exchange could not write, ``refused_code``
-    its abort code, ``refused`` the code of the refusal itself (`drivers.errors.DriveError.code`).
-    ``collisions`` are identifiers that this node and another one send with: (COB-ID, other node).
+    ``answers`` counts the answers to one request; more than one come from several nodes.
+    ``refused_key`` is the object that a start of the exchange could not write, ``refused_code`` its
+    abort code, ``refused`` the code of the refusal itself (`drivers.errors.DriveError.code`).
+    ``collisions`` are identifiers with which both this node and another one send: (COB-ID, other
+    node).
     """
 
     node: int
@@ -68,7 +69,7 @@ class CanEvidence:
     error_register: int | None = None
     status_word: int | None = None
     own_status_word: bool = False
-    """Bits of 6041h are not those of CiA 402 (it echoes the control word): bit 9 says nothing."""
+    """The bits of 6041h are not those of CiA 402 (they echo the control word), nor is bit 9."""
     drive_error: int | None = None
     pdos_wanted: int = 0
     pdos_silent: tuple[int, ...] = ()

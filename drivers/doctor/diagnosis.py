@@ -1,7 +1,7 @@
-"""From facts to causes, the likeliest first: pure.
+"""Diagnosis from facts, the most likely cause first: pure.
 
-Weights: 4 for what names the cause by itself, 3 for an AL status code that names it, 2 for a
-difference between what is and what should be, 1 for what makes it likelier.
+Weights: 4 for a fact that identifies the cause by itself, 3 for an AL status code that identifies
+it, 2 for a difference between actual and expected value, 1 for a fact that makes it more likely.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class CauseText:
 
 @dataclass(frozen=True, slots=True)
 class FactText:
-    """What a fact is called; ``digits``: its number is hexadecimal with so many, 0: decimal."""
+    """Name of a fact; ``digits``: hexadecimal with this number of digits, 0: decimal."""
 
     en: str
     zh: str
     digits: int = 0
 
     def notation(self, value: int | str) -> str:
-        """``0x001B`` or ``27``; a text stays as it is."""
+        """Return ``0x001B`` or ``27``; a text is returned unchanged."""
         if isinstance(value, int) and self.digits:
             return f"0x{value:0{self.digits}X}"
         return str(value)
@@ -51,7 +51,7 @@ class FactText:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A piece of evidence: what it is, as it is, and as it should be (None: nobody says)."""
+    """A piece of evidence: its name, the actual value and the expected one (None: unknown)."""
 
     name: str
     actual: int | str
@@ -59,23 +59,23 @@ class Fact:
 
     @property
     def text(self) -> FactText:
-        """What it is called."""
+        """Name of the fact."""
         return fact_texts()[self.name]
 
     @property
     def shown(self) -> str:
-        """As it is, in the notation that manuals use for it."""
+        """The actual value, in the notation of the manuals."""
         return self.text.notation(self.actual)
 
     @property
     def shown_expected(self) -> str | None:
-        """As it should be, likewise; None where nobody says."""
+        """The expected value, likewise; None if unknown."""
         return None if self.expected is None else self.text.notation(self.expected)
 
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """A possible cause with the facts that speak for it; ``weight`` ranks it."""
+    """A possible cause with the facts that support it; ``weight`` ranks it."""
 
     code: str
     weight: int
@@ -89,20 +89,20 @@ class Cause:
 
 @cache
 def fact_texts() -> dict[str, FactText]:
-    """Names of all facts by code."""
+    """Return the names of all facts by code."""
     data = yaml.safe_load(_FACTS.read_text("utf-8"))
     return {name: FactText(**texts) for name, texts in data.items()}
 
 
 @cache
 def catalogue() -> dict[str, CauseText]:
-    """All causes by code."""
+    """Return all causes by code."""
     data = yaml.safe_load(CATALOGUE.read_text("utf-8"))
     return {code: CauseText(code=code, **texts) for code, texts in data.items()}
 
 
 def diagnose(evidence: Evidence) -> tuple[Cause, ...]:
-    """The causes that fit, the likeliest first; never empty."""
+    """Return the matching causes, the most likely first; never empty."""
     found = ranked(_signs(evidence))
     if found:
         return found
@@ -111,11 +111,11 @@ def diagnose(evidence: Evidence) -> tuple[Cause, ...]:
 
 
 Sign = tuple[str, int, Fact]
-"""A cause, what the fact weighs for it, and the fact."""
+"""A cause, the weight of the fact for it, and the fact."""
 
 
 def ranked(signs: Iterable[Sign]) -> tuple[Cause, ...]:
-    """Causes by the sum of the weights of their facts, the heaviest first."""
+    """Return causes ranked by the sum of the weights of their facts, the highest first."""
     weights: dict[str, int] = {}
     facts: dict[str, list[Fact]] = {}
     for code, weight, fact in signs:

@@ -1,4 +1,4 @@
-"""What a station and the exchange say at the moment of a refusal: typed facts, no words."""
+"""State of a station and the exchange at the time of a refusal: typed facts, no words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class SyncManagerState:
-    """One sync manager: ``length`` as it is, ``expected`` as it was planned (None: not ours)."""
+    """One sync manager: actual ``length``, and the ``expected`` one (None: not planned here)."""
 
     number: int
     start: int
@@ -19,7 +19,7 @@ class SyncManagerState:
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """Synchronisation counters of 1C32h or 1C33h (ETG.1020 table 59); None: not there."""
+    """Synchronisation counters of 1C32h or 1C33h (ETG.1020 table 59); None: not available."""
 
     missed: int | None = None
     cycle_too_small: int | None = None
@@ -30,8 +30,8 @@ class Counters:
 class Evidence:
     """Facts of one EtherCAT station. Times in ns, sizes in bytes; None: could not be read.
 
-    ``refused_key`` is the object of the write that was refused, ``refused_code`` its abort code,
-    ``from_file`` that the write is an init command of the maker's file.
+    ``refused_key`` is the object whose write was refused, ``refused_code`` its abort code;
+    ``from_file``: the write is an init command of the manufacturer's file.
     """
 
     station: int

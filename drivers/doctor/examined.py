@@ -1,4 +1,4 @@
-"""What every bus that knows the doctor offers: causes of one station, the likeliest first."""
+"""Interface of every bus that supports the doctor: causes for one station, the likeliest first."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.errors import DriveError
 
 @dataclass(frozen=True, slots=True)
 class Examination:
-    """One station: ``reached`` says that it is in Operational; then there is no cause."""
+    """One station; ``reached``: it is in Operational, and then there is no cause."""
 
     station: int
     reached: bool
@@ -23,10 +23,10 @@ class Examines(Protocol):
     """A link whose stations the doctor can examine."""
 
     async def stations_known(self) -> Sequence[int]:
-        """Stations that were found, heard or asked."""
+        """Return the stations that were found, received or queried."""
 
     async def examination(self, station: int, refusal: DriveError | None = None) -> Examination:
-        """Why a station is not in Operational; changes no state of a drive.
+        """Return why a station is not in Operational; does not change the state of a drive.
 
-        ``refusal`` is what a start of the exchange raised.
+        ``refusal`` is the error raised by a start of the exchange.
         """

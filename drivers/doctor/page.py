@@ -1,4 +1,4 @@
-"""The documentation's page "My drive does not reach OP", from the catalogue of causes.
+"""The documentation page "My drive does not reach OP", generated from the catalogue of causes.
 
 ``python -m drivers.doctor.page`` writes it; a test compares it.
 """
@@ -46,7 +46,7 @@ _COLUMNS = ["| cause | what it looks like | what to do |", "| --- | --- | --- |"
 
 
 def text() -> str:
-    """The whole page."""
+    """Return the whole page."""
     codes = [
         f"| `0x{code:04X}` | {catalogue()[cause].title} |"
         for code, cause in sorted(AL_CAUSES.items())

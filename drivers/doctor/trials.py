@@ -1,7 +1,7 @@
-"""Settings of ours that can be tried where a drive does not reach Operational. Pure.
+"""Settings of this program to try when a drive does not reach Operational. Pure.
 
-A trial is a profile (or a cycle) that differs in one setting. It is stored nowhere: who tries it
-attaches the profile as it was afterwards, and a person writes the setting into the profile.
+A trial is a profile (or a cycle) that differs in one setting. It is not stored: the caller attaches
+the previous profile again afterwards, and a person enters the setting in the profile.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from profiles.bring_up import BringUp, ClockMode
 from profiles.schema import PdoSet, Profile
 
 MOST = 4
-"""Trials of one station: each takes the drive to Operational again."""
+"""Maximum number of trials for one station: each takes the drive to Operational again."""
 
 _ACTIVATES = (0x0300, 0x0700, 0x0330)
-"""Values of 0980h that drives in use need: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin."""
+"""Values of 0980h used by known drives: SYNC0, SYNC0 and SYNC1, SYNC0 on its pin."""
 
 _HALF_CYCLE_NS = 500_000
-"""Of the 1 ms that a trial takes: as far as possible from the arrival of the process data."""
+"""Half of the 1 ms cycle of a trial: as far as possible from the arrival of the process data."""
 
 _LONGER = (2, 4)
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One changed setting: its place in the profile, its value as it is and as it is tried."""
+    """One changed setting: its path in the profile, its present value and the one to try."""
 
     setting: str
     before: str
@@ -42,7 +42,7 @@ class Trial:
 
 
 def trials(causes: Sequence[Cause], profile: Profile) -> tuple[Trial, ...]:
-    """What to try, for the likeliest cause first; empty where no setting of ours is concerned."""
+    """Return what to try, for the most likely cause first; empty if no setting is concerned."""
     found: dict[tuple[str, str], Trial] = {}
     for cause in causes:
         for trial in _BY_CAUSE.get(cause.code, _none)(cause, profile):
@@ -76,7 +76,7 @@ def _own_assignment(_cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _own_contents(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """The PDOs as the profile describes them, none of them written."""
+    """Use the PDOs as the profile describes them, without writing any of them."""
     pdo = profile.pdo
     if pdo is None or not pdo.remappable:
         return
@@ -107,7 +107,7 @@ def _without_command(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """Modes of the file with a clock, none, then values that other drives need."""
+    """Modes of the file with a clock, then none, then values that other drives need."""
     used = _rules(profile).clock_mode
     others = [m for m in _rules(profile).clock_modes if m is not used and m.assign_activate]
     for mode in others:
@@ -123,7 +123,7 @@ def _other_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _with_clock(cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """For a drive that reports that it needs one."""
+    """Modes with a clock, for a drive that reports that it needs one."""
     return (each for each in _other_clock(cause, profile) if _rules(each.profile).assign_activate)
 
 
@@ -133,7 +133,7 @@ def _without_clock(_cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _mode_without_clock(profile: Profile) -> ClockMode:
-    """The file's own where it has one: it may assign other PDOs."""
+    """Return the file's own mode without clock if it has one: it may assign other PDOs."""
     modes = (mode for mode in _rules(profile).clock_modes if not mode.assign_activate)
     return next(modes, ClockMode(name="doctor"))
 
@@ -148,7 +148,7 @@ def _mode_tried(profile: Profile, mode: ClockMode) -> Trial:
 
 
 def _other_shift(_cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """SYNC0 at another place between two process data: without the file's shift, or half way."""
+    """Shift SYNC0 relative to the process data: without the file's shift, or by half a cycle."""
     activate = _rules(profile).assign_activate
     if not activate:
         return
@@ -189,7 +189,7 @@ def _longer_cycle(_cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """A mode of the file may fix SYNC0's cycle, then a longer cycle of ours changes nothing."""
+    """Free the SYNC0 cycle if the file's mode fixes it; then try longer cycles."""
     mode = _rules(profile).clock_mode
     if mode is not None and mode.sync0.cycle_ns:
         free = mode.model_copy(update={"sync0": mode.sync0.model_copy(update={"cycle_ns": 0})})
@@ -203,7 +203,7 @@ def _clock_then_cycle(cause: Cause, profile: Profile) -> Iterator[Trial]:
 
 
 def _clock_then_contents(cause: Cause, profile: Profile) -> Iterator[Trial]:
-    """Where the drive does not say why: what files get wrong most often."""
+    """Yield the most frequent errors of files, for a drive that does not report the reason."""
     yield from _other_clock(cause, profile)
     yield from _own_contents(cause, profile)
 

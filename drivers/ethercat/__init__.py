@@ -1,1 +1,1 @@
-"""EtherCAT: pysoem in a process of its own, and the Link that talks to it."""
+"""EtherCAT: pysoem in a process of its own, and the Link that communicates with it."""

@@ -16,8 +16,8 @@ def _link(url: BusUrl) -> Link:
 
 BUS = BusKind(
     example="ethercat://eth0",
-    # The link parts a batch by itself, and reads whole objects: one that is cut between two
-    # batches would be read entry by entry.
+    # The link splits batches itself and reads whole objects: an object split between two batches
+    # would be read entry by entry.
     traits=LinkTraits(
         fills_network=True,
         batch=128,

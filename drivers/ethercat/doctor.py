@@ -1,4 +1,4 @@
-"""From what the host process read of a station to facts for the doctor."""
+"""Convert what the host process read from a station to evidence for the doctor."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from profiles.schema import Profile
 def evidence_of(
     facts: Message, profile: Profile | None, refusal: DriveError | None, aliases: Sequence[int]
 ) -> Evidence:
-    """Facts of the host process, with what profile and refusal add."""
+    """Combine the facts from the host process with those from the profile and the refusal."""
     given = dict(facts)
     given["managers"] = tuple(
         SyncManagerState(number, start, length, control, bool(enabled), expected)

@@ -1,7 +1,7 @@
-"""The EtherCAT link in the server: commands to the host process, and its care.
+"""The EtherCAT link in the server: sends commands to the host process and supervises it.
 
-The host is started by `EthercatLink.open` and whenever it dies or hangs; what happened is an
-event. Nothing here blocks: the wire belongs to the other process.
+`EthercatLink.open` starts the host, and it is restarted whenever it dies or hangs; each such
+incident is an event. Nothing here blocks, as the other process owns the wire.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ _OPERATIONAL = 8
 class EthercatLink:
     """One segment, by bus URL or by interface name.
 
-    ``launcher`` is put before the host's command line, as to enter the private network of a
-    virtual segment; ``url`` is then the name that the user knows it by.
+    ``launcher`` precedes the host's command line, for example to enter the private network of a
+    virtual segment; ``url`` is then the name shown to the user.
 
-    Stations count from 1 in the order of the cable. All methods of `drivers.link.Link`, and what
-    only EtherCAT has.
+    Stations count from 1 in the order of the cable. Implements `drivers.link.Link` and the
+    functions that only EtherCAT has.
     """
 
     kind: LinkKind = "ethercat"
@@ -63,10 +63,12 @@ class EthercatLink:
         lockstep: float = 0.0,
         raw_frames: bool = RAW_FRAMES,
     ) -> None:
-        """``lockstep`` only for virtual segments whose time follows the frames: no cycle is
-        skipped then, and time runs at most this many times as fast as real time. Without
-        ``raw_frames`` nothing is used that Linux alone has: frames go through SOEM's own calls,
-        and none are recorded.
+        """Create the link without opening it.
+
+        ``lockstep`` is only for virtual segments whose time follows the frames: no cycle is skipped
+        then, and time runs at most this many times as fast as real time. Without ``raw_frames``
+        only functions available on all systems are used: frames go through SOEM's own calls, and
+        none are recorded.
         """
         interface = interface.removeprefix(_SCHEME)
         self.interface = interface
@@ -104,7 +106,7 @@ class EthercatLink:
 
         Raises:
             LinkLost: no such interface, switched off, or a permission is missing; with commands.
-            Busy: another servodeck has it.
+            Busy: another servodeck uses it.
         """
         if not RAW_FRAMES:
             _require_capture(self.interface)
@@ -113,7 +115,7 @@ class EthercatLink:
             await self.recorder.start()
 
     async def close(self) -> None:
-        """Brake, leave OP, end the host. Calling again does nothing."""
+        """Brake, leave OP, end the host. Further calls have no effect."""
         await self.process_data.close()
         await self._host.stop()
         await self.recorder.stop()
@@ -127,12 +129,12 @@ class EthercatLink:
     ) -> list[Found]:
         """Search the segment: every drive is reset to PREOP and identified.
 
-        Where only ``stations`` are asked for that are known and answer, the others are left alone.
+        If all ``stations`` given are known and answer, the others are left alone.
 
         Raises:
             Busy: the cyclic exchange runs.
         """
-        del stop_after  # all are asked at once
+        del stop_after  # all stations are queried at once
         wanted = None if stations is None else list(stations)
         found: list[Message] = await self._call(
             {"op": "scan", "stations": wanted}, _SCAN_S, progress=progress
@@ -150,9 +152,9 @@ class EthercatLink:
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several; objects of which all subindices are wanted are read at once.
+        """Read several values; objects of which all subindices are requested are read at once.
 
-        A drive whose mailbox leaves two parts of the list without any answer is not asked for more.
+        A drive whose mailbox does not answer two parts of the list is not queried any further.
         """
 
         async def ask(items: list[Item], patience_s: float) -> list[bytes | Message]:
@@ -169,7 +171,7 @@ class EthercatLink:
 
         Raises:
             NotAllowed: control word or setpoint while the cyclic exchange owns it; an enabling
-                control word while it is being set up again, which resets the drives.
+                control word while the exchange is being set up again, which resets the drives.
         """
         index, subindex = object_of(address)
         if (
@@ -186,7 +188,7 @@ class EthercatLink:
         )
 
     def quality(self, station: int | None = None) -> LinkQuality:
-        """Counters as of at most 200 ms ago."""
+        """Return the counters, at most 200 ms old."""
         cyclic = self._status.get("cyclic", {})
         stations: Mapping[int, Message] = self._status.get("stations", {})
         here = stations.get(station) if station is not None else None
@@ -235,7 +237,7 @@ class EthercatLink:
         return None if address.index is not None else text("link.no-object", address=str(address))
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
-        """The drive's own dictionary, by the SDO information service."""
+        """Read the drive's own dictionary by the SDO information service."""
         found: list[Message] = await self._call(
             {"op": "enumerate", "station": station}, 600.0, progress=progress
         )
@@ -246,7 +248,7 @@ class EthercatLink:
         return described
 
     async def set_state(self, station: int, state: AlState) -> None:
-        """Drive one slave to a state.
+        """Bring one slave to a state.
 
         Raises:
             NotAllowed: it refuses; the reason is its AL status code as text.
@@ -254,9 +256,9 @@ class EthercatLink:
         await self._call({"op": "state", "station": station, "state": state.name}, _ANSWER_S)
 
     async def survey(self) -> Survey:
-        """The segment as it is now: stations in the order of the cable, ports, findings.
+        """Return the present segment: stations in the order of the cable, ports, findings.
 
-        Before the first search there are none. Reads some registers of every slave.
+        Empty before the first search. Reads some registers of every slave.
 
         Raises:
             LinkLost: the host or the interface is gone.
@@ -270,12 +272,12 @@ class EthercatLink:
 
     @property
     def real_time(self) -> tuple[Text, ...]:
-        """What the host process was granted and denied, in sentences."""
+        """Messages on the real-time privileges that the host process was granted and denied."""
         return self._host.granted
 
     @property
     def private_network(self) -> bool:
-        """The interface is of a private network in which everything is permitted."""
+        """Whether the interface is in a private network, in which everything is permitted."""
         return self._launched
 
     async def clear_port_counters(self, station: int) -> None:
@@ -298,8 +300,8 @@ class EthercatLink:
     ) -> str:
         """Send a file by FoE and bring the drive back to PREOP; see `firmware.load`.
 
-        An interrupted download can leave a drive without firmware. Returns the state in which
-        the drive took the file: BOOT, or PREOP where it has no BOOT.
+        An interrupted download can leave a drive without firmware. Returns the state in which the
+        drive accepted the file: BOOT, or PREOP if it has no BOOT.
         """
         message = {"op": "foe", "station": station, "name": name, "data": data}
         message |= {"password": password, "where": where}
@@ -310,9 +312,10 @@ class EthercatLink:
     async def diagnose(
         self, station: int, refusal: DriveError | None = None
     ) -> tuple[Evidence, tuple[Cause, ...]]:
-        """Facts of a station as it is now, and the causes that fit, the likeliest first.
+        """Return the present facts of a station, and the matching causes, the most likely first.
 
-        ``refusal`` is what a start of the exchange raised. Reads registers and objects only.
+        ``refusal`` is the error raised by a start of the exchange. Only reads registers and
+        objects.
 
         Raises:
             LinkLost: the host or the interface is gone.
@@ -332,7 +335,7 @@ class EthercatLink:
 
     @property
     def doctor(self) -> EthercatLink:
-        """It says itself why a station is not in Operational."""
+        """The link itself, which determines why a station is not in Operational."""
         return self
 
     async def stations_known(self) -> Sequence[int]:
@@ -347,7 +350,7 @@ class EthercatLink:
 
     @property
     def frames(self) -> EthercatLink | None:
-        """It keeps the last minute of its frames, where a process gets copies of them (Linux)."""
+        """The link itself where a process receives copies of its frames (Linux), else None."""
         return self if self._raw_frames else None
 
     async def flight(self, station: int | None = None) -> bytes:
@@ -355,7 +358,7 @@ class EthercatLink:
         return await self.recorder.file(station)
 
     def permissions(self) -> permissions.Permissions:
-        """What is missing on the interface, with the commands that grant it."""
+        """Return what is missing on the interface, with the commands that grant it."""
         return permissions.check(self.interface)
 
     # Parts ---------------------------------------------------------------------------------
@@ -377,7 +380,8 @@ class EthercatLink:
         elif message["event"] == "link":
             kind, station = message["kind"], message["station"]
             if kind == "back" and station is None and self.process_data.trouble:
-                # Who reads everything again on "back" waits until the drives have been set up.
+                # A listener that reads everything again on "back" must wait until the drives are
+                # set up.
                 kind = "state"
             self._notify(LinkEvent(kind, station, Text.from_wire(message["text"]), message["code"]))
 
@@ -430,7 +434,7 @@ def _options(lockstep: float) -> tuple[str, ...]:
 
 
 def _require_capture(interface: str) -> None:
-    """Without its packet capture library the host process could not even start.
+    """Check the packet capture library, without which the host process could not start.
 
     Raises:
         LinkLost: the library is missing, too old or not permitted, or has no such adapter.
@@ -441,5 +445,5 @@ def _require_capture(interface: str) -> None:
 
 
 def segment_of(link: Link | None) -> EthercatLink | None:
-    """The link of an EtherCAT segment, for what only EtherCAT has; None for another bus."""
+    """Return the link as an EtherCAT segment; None for another bus."""
     return link if isinstance(link, EthercatLink) else None

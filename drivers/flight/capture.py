@@ -1,4 +1,4 @@
-"""Frames of the blocks that `drivers.computer.packet_ring` collects: pure, no I/O.
+"""Decoding of the blocks that `drivers.computer.packet_ring` collects: pure, no I/O.
 
 Source: ``include/uapi/linux/if_packet.h`` of Linux (TPACKET_V3); packet(7).
 """
@@ -22,7 +22,7 @@ _TYPE_AT = _FRAME_HEAD + 10
 
 
 def frames_of_block(block: bytes) -> Iterator[Frame]:
-    """The frames of a block, in the order of their times."""
+    """Iterate over the frames of a block, in the order of their times."""
     frames, at = _BLOCK.unpack_from(block)
     for _ in range(frames):
         following, seconds, nanoseconds, kept, _, _, frame_at, _ = _FRAME.unpack_from(block, at)

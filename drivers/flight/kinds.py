@@ -1,4 +1,4 @@
-"""Rings for the buses that this programme has: link type, and which frames are whose."""
+"""Frame rings for each bus: link type, and which frames belong to which station."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.flight.ring import FrameRing, Unpack, one_frame
 
 _ETHERTYPE, _FIRST_STATION = 0x88A4, 0x1000
 _NODE_COMMANDS = (4, 5, 6, 14)
-"""FPRD, FPWR, FPRW and FRMW name a station by its configured address (ETG.1000.4 table 5)."""
+"""FPRD, FPWR, FPRW and FRMW use the configured station address (ETG.1000.4 table 5)."""
 
 _LOGICAL_COMMANDS = (10, 11, 12)
 _CAN_REMOTE = 1 << 30
@@ -18,22 +18,22 @@ _BROADCAST_IDS = (0x000, 0x080, 0x100)
 
 
 def ethercat_ring(interface: str, unpack: Unpack = one_frame) -> FrameRing:
-    """Ethernet frames of a segment; ``unpack`` says how they are put in."""
+    """Create a ring for the Ethernet frames of a segment; ``unpack`` decodes its contents."""
     return FrameRing(ETHERNET, interface, _of_slave, unpack=unpack)
 
 
 def can_ring(channel: str) -> FrameRing:
-    """CAN frames as SocketCAN has them."""
+    """Create a ring for CAN frames in SocketCAN format."""
     return FrameRing(CAN_SOCKETCAN, channel, _of_node)
 
 
 def serial_ring(device: str) -> FrameRing:
-    """Bytes of a serial line; see `pcapng.SERIAL_USER`."""
+    """Create a ring for the bytes of a serial line; see `pcapng.SERIAL_USER`."""
     return FrameRing(SERIAL_USER, device, _of_address)
 
 
 def can_data(cob_id: int, data: bytes, remote: bool) -> bytes:
-    """A frame of LINKTYPE_CAN_SOCKETCAN: identifier and flags, length, data."""
+    """Return a frame of LINKTYPE_CAN_SOCKETCAN: identifier and flags, length, data."""
     return struct.pack(">IB3x", cob_id | (_CAN_REMOTE if remote else 0), len(data)) + data
 
 
@@ -46,7 +46,7 @@ def _of_slave(frame: bytes, station: int) -> bool:
 
 
 def _datagrams(frame: bytes) -> Iterator[tuple[int, int]]:
-    """Command and address of each datagram of an EtherCAT frame (ETG.1000.4 clause 5.4)."""
+    """Iterate over command and address of each datagram in a frame (ETG.1000.4 clause 5.4)."""
     if len(frame) < 28 or int.from_bytes(frame[12:14], "big") != _ETHERTYPE:
         return
     at, more = 16, True

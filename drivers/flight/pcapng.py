@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 ETHERNET, CAN_SOCKETCAN, SERIAL_USER = 1, 227, 147
 """LINKTYPE_ETHERNET, LINKTYPE_CAN_SOCKETCAN, and LINKTYPE_USER0 for serial lines: the bytes as
-they travel, one packet for each request and each portion of an answer."""
+transferred, one packet for each request and each portion of an answer.
+"""
 
 _SECTION, _INTERFACE, _PACKET = 0x0A0D0D0A, 1, 6
 _END, _COMMENT, _NAME, _RESOLUTION, _FLAGS, _APPLICATION = 0, 1, 2, 9, 2, 4
@@ -22,7 +23,7 @@ _LONGEST = 0xFFFF
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame; ``time_ns`` is the Unix epoch in nanoseconds. ``sent``: by this computer."""
+    """One frame; ``time_ns`` is in nanoseconds since the Unix epoch. ``sent``: by this computer."""
 
     time_ns: int
     sent: bool
@@ -31,7 +32,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """A remark of our own: a change of state, a setpoint, a fault. ``station`` None: the bus."""
+    """An annotation: a change of state, a setpoint, a fault. ``station`` None: the bus."""
 
     time_ns: int
     text: str
@@ -39,9 +40,9 @@ class Note:
 
 
 def file_of(frames: Sequence[Frame], notes: Iterable[Note], link_type: int, name: str) -> bytes:
-    """The whole file. A note becomes the comment of the first frame that is not older.
+    """Return the whole file. A note becomes the comment of the first frame that is not older.
 
-    Where no frame follows, it belongs to the last one; without any frame to the section.
+    Without a later frame it becomes the comment of the last one; without any frame, of the section.
     """
     comments: dict[int, list[str]] = {}
     section: list[str] = []

@@ -1,12 +1,11 @@
 """The recorder of an EtherCAT segment: ``python -m drivers.flight.process IFACE --control FD``.
 
 The kernel copies every EtherCAT frame of the interface, sent and received, with its time in
-nanoseconds; this process only collects the copies. It runs next to the host process at low
-priority and looks ten times a second: a process that waits for each frame would be woken from
-within the host's cycle, which costs the cycle some microseconds. It first writes `READY`. Lines of
-JSON come on the control socket: ``{"note": TEXT, "station": N, "time_ns": T}`` and ``{"file": true,
-"station": N}``; the answer to the latter is a length of 8 bytes, little endian, and the pcapng
-file.
+nanoseconds; this process only collects the copies. It runs next to the host process at low priority
+and polls ten times a second: a process that waits for each frame would be woken within the host's
+cycle, which costs the cycle some microseconds. It first writes `READY`. Lines of JSON come on the
+control socket: ``{"note": TEXT, "station": N, "time_ns": T}`` and ``{"file": true, "station": N}``;
+the answer to the latter is a length of 8 bytes, little endian, and the pcapng file.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ _AGAIN_S, _LOOK_S = 1.0, 0.1
 
 
 class Recorder:
-    """Frames in, files out. ``control`` ends it when it closes."""
+    """Collects frames and sends files. The process ends when ``control`` closes."""
 
     def __init__(self, interface: str, control: socket.socket) -> None:
         self._interface = interface
@@ -44,11 +43,12 @@ class Recorder:
         self._sending = threading.Lock()
 
     def run(self) -> None:
-        """Until the control socket closes. Says `READY` once the wire is being listened to."""
+        """Run until the control socket closes. Sends `READY` once the wire is being recorded."""
         self._wire, retry_s = open_wire(self._interface), time.monotonic() + _AGAIN_S
         with contextlib.suppress(OSError):
             self._control.sendall(READY)
-        # Only now: a busy computer would keep the first frames of a bus from being recorded.
+        # Not earlier: on a busy computer, low priority would delay the recording of the first
+        # frames.
         yield_processor(_NICE)
         while True:
             now = time.monotonic()
@@ -61,7 +61,7 @@ class Recorder:
                 return
 
     def _take(self) -> None:
-        """Collect what the kernel has closed."""
+        """Collect the blocks that the kernel has closed."""
         if self._wire is None:
             return
         self._keep(self._wire)
@@ -91,10 +91,11 @@ class Recorder:
             if "note" in request:
                 self._ring.note(request["note"], request["station"], request["time_ns"])
             else:
-                # A file has the frames up to its request: the block that was open then is closed.
+                # A file contains the frames up to its request: wait until the block open at that
+                # time is closed.
                 time.sleep(2 * CLOSED_S)
                 self._take()
-                # The file is made and sent while frames go on being taken.
+                # The file is created and sent while recording continues.
                 threading.Thread(target=self._send, args=(request["station"],)).start()
         return True
 
@@ -105,7 +106,7 @@ class Recorder:
 
 
 def open_wire(interface: str) -> PacketRing | None:
-    """The frames of the interface; None where they cannot be had."""
+    """Open the recording of the interface; None if that is not possible."""
     try:
         return PacketRing(interface)
     except OSError:

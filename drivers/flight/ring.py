@@ -1,4 +1,4 @@
-"""The last frames of a bus in bounded memory, with remarks of our own."""
+"""The last frames of a bus in bounded memory, with annotations."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ MAX_BYTES = 64 << 20
 _MAX_NOTES = 2000
 _HEAD = struct.Struct("<qB")
 _OVERHEAD = 152
-"""Bytes of the Python objects and their place in the ring, next to the frames themselves."""
+"""Bytes of the Python objects and their place in the ring, in addition to the frames."""
 
 Belongs = Callable[[bytes, int], bool]
-"""Whether a frame has to do with a station."""
+"""Returns whether a frame concerns a station."""
 
 Unpack = Callable[[bytes], Iterator[Frame]]
-"""The frames of what `FrameRing.put_packed` was given."""
+"""Decodes the frames in data passed to `FrameRing.put_packed`."""
 
 
 def one_frame(packed: bytes) -> Iterator[Frame]:
-    """The frame that `FrameRing.put` packed."""
+    """Decode the frame packed by `FrameRing.put`."""
     time_ns, sent = _HEAD.unpack_from(packed)
     yield Frame(time_ns, bool(sent), packed[_HEAD.size :])
 
 
 class FrameRing:
-    """Frames of at most a minute and at most ``max_bytes``; putting one in never blocks on I/O.
+    """Frames of at most a minute and at most ``max_bytes``; adding one never blocks on I/O.
 
-    Safe for one thread that records and another that takes a file.
+    Safe for one recording thread and another that requests a file.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class FrameRing:
         self.link_type = link_type
         self.name = name
         self.dropped = 0
-        """Frames that went before a minute was over, because memory is bounded."""
+        """Number of frames removed before a minute was over, because memory is bounded."""
         self._belongs = belongs
         self._max_bytes = max_bytes
         self._unpack = unpack
@@ -59,15 +59,15 @@ class FrameRing:
 
     @property
     def bytes_held(self) -> int:
-        """Memory of the frames, about."""
+        """Approximate memory of the frames [bytes]."""
         return self._bytes
 
     def put(self, time_ns: int, sent: bool, data: bytes) -> None:
-        """Keep a frame; ``time_ns`` since the Unix epoch. For a ring of single frames."""
+        """Add a frame; ``time_ns`` since the Unix epoch. For a ring of single frames."""
         self.put_packed(time_ns, 1, _HEAD.pack(time_ns, sent) + data)
 
     def put_packed(self, last_ns: int, frames: int, packed: bytes) -> None:
-        """Keep ``frames`` that this ring's ``unpack`` reads, the last of ``last_ns``."""
+        """Add ``frames`` in the format of this ring's ``unpack``, the last one from ``last_ns``."""
         with self._lock:
             self._held.append((last_ns, frames, packed))
             self._bytes += len(packed) + _OVERHEAD
@@ -78,12 +78,12 @@ class FrameRing:
                 self.dropped += lost if first_ns >= oldest_ns else 0
 
     def note(self, text: str, station: int | None = None, time_ns: int | None = None) -> None:
-        """Keep a remark for the next frame."""
+        """Add an annotation for the next frame."""
         with self._lock:
             self._notes.append(Note(time_ns or time.time_ns(), text, station))
 
     def file(self, station: int | None = None) -> bytes:
-        """What is held now as a pcapng file; of one station only what has to do with it."""
+        """Return the present contents as a pcapng file; with a station, only what concerns it."""
         with self._lock:
             held, notes = list(self._held), list(self._notes)
         frames = [

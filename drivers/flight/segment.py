@@ -1,4 +1,4 @@
-"""The recorder process of an EtherCAT segment, as the server starts and asks it."""
+"""Server side of the recorder process of an EtherCAT segment: start, requests and end."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FILE_S, _START_S, _END_S = 30.0, 10.0, 2.0
 
 
 class SegmentRecorder:
-    """Starts with the link and ends with it; a link works without it as well."""
+    """Starts and ends with the link, which also works without it."""
 
     def __init__(self, interface: str, launcher: Sequence[str]) -> None:
         self._interface = interface
@@ -30,13 +30,13 @@ class SegmentRecorder:
 
     @property
     def process_id(self) -> int | None:
-        """Of the recorder; None where it does not run."""
+        """Process number of the recorder; None if it does not run."""
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Begin to record, before the first frame that follows.
+        """Start recording before any further frame.
 
-        A computer that has no room for the process, or no time for it, records nothing.
+        If the process cannot be started, nothing is recorded.
         """
         ours, theirs = socket.socketpair()
         try:
@@ -54,13 +54,13 @@ class SegmentRecorder:
             await self.stop()
 
     def note(self, text: str, station: int | None = None) -> None:
-        """A remark for the next frame."""
+        """Add an annotation for the next frame."""
         message = {"note": text, "station": station, "time_ns": time.time_ns()}
         if self._streams is not None and not self._streams[1].is_closing():
             self._streams[1].write(json.dumps(message).encode() + b"\n")
 
     async def file(self, station: int | None = None) -> bytes:
-        """The last minute as a pcapng file.
+        """Return the last minute as a pcapng file.
 
         Raises:
             LinkLost: the recorder does not run.
@@ -80,7 +80,7 @@ class SegmentRecorder:
                 raise self._gone() from error
 
     async def stop(self) -> None:
-        """End it. Calling again does nothing."""
+        """End the recorder. Further calls have no effect."""
         if self._streams is not None:
             self._streams[1].close()
             self._streams = None

@@ -1,4 +1,4 @@
-"""A serial port whose bytes are kept in a ring."""
+"""A serial port whose data are recorded in a ring."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ class BytesPort(Protocol):
     """As `drivers.modbus.port.Port`."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Bytes that are there."""
+        """Return the bytes received."""
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
 
 
 class RecordedPort:
-    """Passes everything on and keeps it."""
+    """Passes all data on and records them."""
 
     def __init__(self, port: BytesPort, ring: FrameRing) -> None:
         self._port = port

@@ -1,4 +1,4 @@
-"""MLink as a kind of bus. An MMS7 is set to 2.5 Mbaud, even parity (004:1457-1464)."""
+"""MLink as a kind of bus. The MMS7 default is 2.5 Mbaud, even parity (004:1457-1464)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """MLink: EZmotion's object access over RS485, as Modbus RTU frames by an object-to-register rule.
 
-Manual 004:1445-1470 names MLink, its line settings and addresses, and prints no frame. The rule,
-the word order and the function codes here come from EZmotion's public Python package for the
+Manual 004:1445-1470 describes MLink, its line settings and addresses, but prints no frame. The
+rule, the word order and the function codes here come from EZmotion's public Python package for the
 RS485 models of the same family (``EZMotionMMS2`` 1.0.2). They are not confirmed on an MMS7xxxxBE.
 """
 
@@ -18,18 +18,18 @@ from drivers.modbus.registers import Place, words_of
 from drivers.texts.message import Text, text
 from profiles.schema import DataType, LinkKind, Profile
 
-#: Longest value that the package moves: two registers.
+#: Longest value that the package transfers: two registers.
 _MAX_WORDS = 2
 
 
 def register_of(index: int, subindex: int) -> int:
-    """First register of an object: 6040h -> 6400h, 6099h:02 -> 6991h, 2105h -> 3050h.
+    """Return the first register of an object: 6040h -> 6400h, 6099h:02 -> 6991h, 2105h -> 3050h.
 
-    Subindex 0 and 1 share a register, and so do a few objects far apart; `MlinkLayout` shows
-    them apart by the profile.
+    Subindex 0 and 1 share a register, and so do a few unrelated objects; `MlinkLayout`
+    distinguishes them by the profile.
 
     Raises:
-        NotAllowed: the rule leads beyond the 16-bit register numbers.
+        NotAllowed: the rule exceeds the 16-bit register numbers.
     """
     register = (index & 0xF000) + ((index & 0x0FFF) << 4) + max(subindex - 1, 0)
     if register > 0xFFFF:
@@ -43,11 +43,11 @@ def register_of(index: int, subindex: int) -> int:
 
 
 class MlinkLayout:
-    """Registers by rule. Without a profile every object is assumed to be reachable.
+    """Registers by rule. Without a profile every object is assumed to be accessible.
 
-    Two neighbours are read in one request only where the profile allows blocks
-    (``max_registers``), and only subindices of one object that fill one register each: the
-    numbers of 32-bit subindices overlap, so there is no row of registers behind them.
+    Two neighbours are read in one request only if the profile allows blocks (``max_registers``),
+    and only subindices of one object that fill one register each: the numbers of 32-bit subindices
+    overlap, so there is no row of registers behind them.
     """
 
     kind: LinkKind = "mlink"
@@ -124,10 +124,10 @@ class MlinkLayout:
 
 
 def ambiguous_objects(profile: Profile) -> dict[tuple[int, int], str]:
-    """Objects that share a register with another one, and with which.
+    """Return the objects that share a register with another one, and with which.
 
-    Subindex 0 of a record is replaced by subindex 1, which the package reads there. Where two
-    different objects meet, neither can be trusted.
+    Subindex 0 of a record is replaced by subindex 1, which the package reads there. If two
+    different objects share a register, neither can be trusted.
     """
     owners: dict[int, list[tuple[int, int, DataType]]] = {}
     for parameter in profile.parameters:
@@ -149,5 +149,5 @@ def ambiguous_objects(profile: Profile) -> dict[tuple[int, int], str]:
 
 
 def mlink_link(url: str, settings: LineSettings) -> RegisterLink:
-    """An MLink bus, not yet opened."""
+    """Create the link of an MLink bus without opening it."""
     return RegisterLink(url, settings, MlinkLayout())

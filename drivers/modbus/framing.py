@@ -1,9 +1,9 @@
-"""Modbus RTU frames: pure functions from numbers to bytes and back.
+"""Modbus RTU frames: pure functions that encode and decode them.
 
-Sources: "MODBUS Application Protocol Specification V1.1b3" (function codes 03, 06 and 16,
-clauses 6.3, 6.6, 6.12 and 7) and "MODBUS over Serial Line V1.02" (clause 2.5.1, frame and CRC).
-The frames printed in manual 003:1040-1170 are the test vectors. The CRC travels low byte
-first; manual 003 calls that byte CRC_H.
+Sources: "MODBUS Application Protocol Specification V1.1b3" (function codes 03, 06 and 16, clauses
+6.3, 6.6, 6.12 and 7) and "MODBUS over Serial Line V1.02" (clause 2.5.1, frame and CRC). The frames
+printed in manual 003:1040-1170 are the test vectors. The CRC is sent low byte first; manual 003
+calls that byte CRC_H.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ WRITE_ONE = 0x06
 WRITE_MANY = 0x10
 EXCEPTION_BIT = 0x80
 
-#: Longest block of one request, from the 8-bit byte count (V1.1b3, clauses 6.3 and 6.12).
+#: Longest block of one request, limited by the 8-bit byte count (V1.1b3, clauses 6.3 and 6.12).
 MAX_READ_REGISTERS = 125
 MAX_WRITE_REGISTERS = 123
 MAX_FRAME_BYTES = 256
 
-#: What an exception code means. 1 to 11: V1.1b3 clause 7; 2 to 4 also in manual 003:1160-1162.
+#: Meaning of exception codes. 1 to 11: V1.1b3 clause 7; 2 to 4 also in manual 003:1160-1162.
 EXCEPTION_TEXTS: dict[int, str] = {
     1: "the drive does not know this function code",
     2: "the drive has no such register (illegal address)",
@@ -39,9 +39,9 @@ EXCEPTION_TEXTS: dict[int, str] = {
     11: "the drive behind the gateway does not answer",
 }
 
-#: The drive could not do it now and did nothing: to be asked again later (V1.1b3 clause 7).
+#: The drive was busy and did nothing: repeat the request later (V1.1b3 clause 7).
 BUSY = 6
-#: What to do about an exception code.
+#: Remedy for each exception code.
 EXCEPTION_REMEDIES: dict[int, str] = {
     1: "this drive or firmware may speak another dialect: check that the profile fits the drive",
     2: "this model or firmware may not have it: compare with the drive's manual",
@@ -70,7 +70,7 @@ _CRC_TABLE = _crc_table()
 
 
 def crc16(data: bytes | bytearray | memoryview) -> int:
-    """CRC of Modbus RTU (reflected polynomial A001h, start FFFFh)."""
+    """Return the CRC of Modbus RTU (reflected polynomial A001h, start FFFFh)."""
     crc = 0xFFFF
     table = _CRC_TABLE
     for byte in data:
@@ -79,18 +79,18 @@ def crc16(data: bytes | bytearray | memoryview) -> int:
 
 
 def seal(body: bytes) -> bytes:
-    """``body`` with its CRC appended, low byte first."""
+    """Return ``body`` with its CRC appended, low byte first."""
     return body + crc16(body).to_bytes(2, "little")
 
 
 def is_sealed(frame: bytes) -> bool:
-    """True if the last two bytes are the CRC of the others."""
+    """Return whether the last two bytes are the CRC of the others."""
     return len(frame) >= 4 and crc16(frame[:-2]) == frame[-2] | frame[-1] << 8
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One question of the master. ``values`` are empty for a read."""
+    """One request of the master. ``values`` are empty for a read."""
 
     station: int
     function: int
@@ -101,11 +101,11 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A request's bytes together with what its answer must look like.
+    """The bytes of a request together with the form of its answer.
 
     A good answer starts with ``head`` and is ``length`` bytes long; a refusal starts with
     ``refusal`` and is 5 bytes long. Function codes 06 and 16 echo address and value or count in
-    ``head``, so that only the answer to this very request fits.
+    ``head``, so that only the answer to this request matches.
     """
 
     frame: bytes
@@ -115,7 +115,7 @@ class Query:
 
     @property
     def station(self) -> int:
-        """Address of the drive asked."""
+        """Address of the drive."""
         return self.frame[0]
 
 
@@ -179,10 +179,10 @@ def _check_words(values: Sequence[int]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Result of looking for an answer in received bytes.
+    """Result of searching received bytes for an answer.
 
-    ``frame`` is the whole answer or None; ``start`` and ``end`` are its place in the buffer.
-    ``crc_errors`` counts places that had the shape of the answer, all its bytes, and a wrong CRC.
+    ``frame`` is the whole answer or None; ``start`` and ``end`` are its position in the buffer.
+    ``crc_errors`` counts positions with the form of the answer, all its bytes, and a wrong CRC.
     """
 
     frame: bytes | None
@@ -199,11 +199,11 @@ class Answer:
 
 
 def find_answer(buffer: bytes | bytearray, query: Query) -> Answer:
-    """Look for the answer to ``query`` anywhere in ``buffer``.
+    """Search for the answer to ``query`` anywhere in ``buffer``.
 
-    Whatever stands before it (noise, the tail of a late answer, another station's frame) is
-    skipped; a candidate with a wrong CRC is counted and skipped by one byte, so that the true
-    answer is found even inside what looked like a longer one.
+    Anything before it (noise, the tail of a late answer, another station's frame) is skipped; a
+    candidate with a wrong CRC is counted and skipped by one byte, so that the true answer is found
+    even inside what looked like a longer one.
     """
     crc_errors = 0
     size = len(buffer)
@@ -224,10 +224,10 @@ def find_answer(buffer: bytes | bytearray, query: Query) -> Answer:
 
 
 class RequestParser:
-    """Cuts a byte stream into requests, on the slave's side.
+    """Splits a byte stream into requests, on the slave's side.
 
-    A request is recognised by its function code, its length and its CRC. Bytes that cannot be
-    the start of one are skipped and counted, so the stream is found again after noise.
+    A request is recognised by its function code, its length and its CRC. Bytes that cannot be the
+    start of one are skipped and counted, so that the parser resynchronises after noise.
     """
 
     def __init__(self) -> None:
@@ -235,15 +235,15 @@ class RequestParser:
         self.skipped_bytes = 0
 
     def feed(self, data: bytes) -> list[Request]:
-        """Take bytes and return the requests that are complete now."""
+        """Add bytes and return the requests that are now complete."""
         self._buffer += data
         return self._cut(silent=False)
 
     def end_of_frame(self) -> list[Request]:
-        """The line fell silent (RTU frames end by silence): nothing more belongs to what is left.
+        """Return the remaining requests at the end of a frame, which RTU marks by silence.
 
-        What only looked like the start of a longer request is searched once more. A whole frame
-        of a function code that is not known here is returned with ``count`` 0.
+        Bytes that only looked like the start of a longer request are searched once more. A whole
+        frame with an unknown function code is returned with ``count`` 0.
         """
         rest = bytes(self._buffer)
         if rest and self._request_length(0) is None and is_sealed(rest):
@@ -268,14 +268,15 @@ class RequestParser:
                 start = done = start + length
             else:
                 start += 1
-        # Bytes in front of nothing known stay until silence: they may be a function not known.
+        # Bytes before anything known are kept until silence: they may belong to an unknown
+        # function.
         keep = max(done, len(self._buffer) - MAX_FRAME_BYTES)
         self.skipped_bytes += keep - done
         del self._buffer[:keep]
         return found
 
     def _request_length(self, start: int) -> int | None:
-        """Length of the request that would start here; None if none can."""
+        """Return the length of the request that would start here; None if none can."""
         if len(self._buffer) - start < 8 or self._buffer[start] > 247:
             return None
         function = self._buffer[start + 1]
@@ -299,16 +300,16 @@ def _parse_request(frame: bytes) -> Request:
 
 
 def read_response(station: int, words: Sequence[int]) -> bytes:
-    """Answer to 03 with the registers' values."""
+    """Return an answer to 03 with the values of the registers."""
     return seal(struct.pack(f">BBB{len(words)}H", station, READ, 2 * len(words), *words))
 
 
 def write_response(request: Request) -> bytes:
-    """Answer to 06 or 16: address and value, or address and count."""
+    """Return an answer to 06 or 16: address and value, or address and count."""
     second = request.values[0] if request.function == WRITE_ONE else request.count
     return seal(struct.pack(">BBHH", request.station, request.function, request.start, second))
 
 
 def exception_response(station: int, function: int, code: int) -> bytes:
-    """Refusal of a request with ``function``; ``code`` as in EXCEPTION_TEXTS."""
+    """Return the refusal of a request with ``function``; ``code`` as in EXCEPTION_TEXTS."""
     return seal(bytes((station, (function | EXCEPTION_BIT) & 0xFF, code)))

@@ -1,11 +1,11 @@
-"""Answers that may still come after their time-out, and how to be sure that they no longer can.
+"""Late answers after a time-out, and how to make sure that none can come any more.
 
-Modbus RTU answers carry no number: one that comes too late looks like the answer to the next
-question of the same shape, and a late refusal looks like a refusal of the next question. After
-a failed question, therefore, a check is asked first: a harmless read whose answer has a shape
-that nothing outstanding has. Drives answer in order, so once it has come, nothing older can
-follow. Where the check is refused, that proves something only if nothing outstanding could have
-been refused in the same way; the second check is then a read of another function (04).
+Modbus RTU answers carry no number: a late one looks like the answer to the next request of the same
+form, and a late refusal looks like a refusal of the next request. After a failed request,
+therefore, a check is sent first: a harmless read whose answer has a form that no outstanding answer
+has. Drives answer in order, so once it has arrived, nothing older can follow. If the check is
+refused, that is conclusive only if nothing outstanding could have been refused in the same form;
+the second check is then a read of another function (04).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class _Outstanding:
 
 
 class LateAnswers:
-    """Book-keeping for one station. Times are the line's clock in seconds."""
+    """Records the late answers of one station. Times are the line's clock in seconds."""
 
     def __init__(self) -> None:
         self._outstanding: dict[bytes, _Outstanding] = {}
@@ -33,7 +33,7 @@ class LateAnswers:
         self._good_frames: set[bytes] = set()
 
     def answered(self, query: Query) -> None:
-        """Remember a read that this drive answers with values: it makes a good check."""
+        """Record a read that this drive answers with values: it is a suitable check."""
         if query.frame[1] == READ and query.frame not in self._good_frames:
             if len(self._good_frames) >= _FRAMES_KEPT:
                 self._good_frames.clear()
@@ -41,12 +41,12 @@ class LateAnswers:
             self._good[query.head] = query
 
     def failed(self, query: Query, expiry_s: float) -> None:
-        """No good answer came to ``query``; it may still come until ``expiry_s``."""
+        """Record that ``query`` had no good answer; it may still come until ``expiry_s``."""
         may_be_refused = query.frame not in self._good_frames
         self._outstanding[query.head] = _Outstanding(query, expiry_s, may_be_refused)
 
     def pending(self, now_s: float) -> bool:
-        """True if something may still come."""
+        """Return whether an answer may still come."""
         if not self._outstanding:
             return False
         for head in [h for h, item in self._outstanding.items() if item.expiry_s <= now_s]:
@@ -54,14 +54,14 @@ class LateAnswers:
         return bool(self._outstanding)
 
     def check(self, near: Query) -> Query:
-        """A read whose answer looks different from all that may come, best one known to work."""
+        """Return a read whose answer differs from all that may come, if possible a proven one."""
         for head, query in self._good.items():
             if head not in self._outstanding:
                 return query
         return self._unlike(near, READ)
 
     def second_check(self, near: Query) -> Query:
-        """A read whose refusal, too, looks different: many drives do not know function 04."""
+        """Return a read whose refusal differs, too: many drives do not know function 04."""
         return self._unlike(near, READ_INPUT)
 
     def _unlike(self, near: Query, function: int) -> Query:
@@ -70,18 +70,18 @@ class LateAnswers:
         return next(query for query in shapes if query.head not in self._outstanding)
 
     def refusal_proves(self, check: Query) -> bool:
-        """True if this refusal can only be that of ``check``."""
+        """Return whether this refusal can only be that of ``check``."""
         return not any(
             item.may_be_refused and item.query.refusal == check.refusal
             for item in self._outstanding.values()
         )
 
     def clear(self) -> None:
-        """Nothing can come any more."""
+        """Record that no answer can come any more."""
         self._outstanding.clear()
 
     def cut(self, buffer: bytearray, query: Query) -> int:
-        """Remove late answers from the bytes that came after ``query``; returns how many."""
+        """Remove late answers from the bytes received after ``query``; return how many."""
         removed = 0
         for head, item in self._outstanding.items():
             if head == query.head:

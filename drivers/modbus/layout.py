@@ -1,4 +1,4 @@
-"""Where the values of one kind of serial link lie among the registers: the seam, and by table."""
+"""Position of values among the registers of a serial link: the interface, and by table."""
 
 from __future__ import annotations
 
@@ -22,32 +22,32 @@ class BlockLimits:
 
 
 class Layout(Protocol):
-    """Where the objects of one kind of link lie among the registers."""
+    """Position of the objects of one kind of link among the registers."""
 
     kind: LinkKind
 
     def configure(self, station: int, profile: Profile) -> None:
-        """Take over what the profile says of this link for one station."""
+        """Apply the profile's data on this link for one station."""
 
     def place(self, station: int, address: Address) -> Place:
-        """Registers of a value.
+        """Return the registers of a value.
 
         Raises:
             NotAllowed: this value cannot be reached over this link; the message states the reason.
         """
 
     def limits(self, station: int) -> BlockLimits:
-        """How values may be read together."""
+        """Return how values may be read together."""
 
     def identity(self) -> tuple[Address, ...]:
-        """What a scan reads: the first must exist in every drive; the rest is for `describe`."""
+        """Return what a scan reads: the first must exist in every drive."""
 
     def describe(self, station: int, values: Sequence[int | None]) -> Found:
-        """A scan's finding from the values of `identity` (None: could not be read)."""
+        """Create the result of a scan from the values of `identity` (None: could not be read)."""
 
 
 class TableLayout:
-    """Registers by table: each parameter of the profile names its own (manual 003)."""
+    """Registers by table: each parameter of the profile states its own (manual 003)."""
 
     kind: LinkKind = "modbus"
 
@@ -78,7 +78,7 @@ class TableLayout:
         return self._limits.get(station, BlockLimits())
 
     def identity(self) -> tuple[Address, ...]:
-        """Any answer to a read of register 0 shows that somebody is there."""
+        """Return register 0: any answer to reading it shows that a drive is present."""
         return (Address(None, 0, "UINT16", register=0),)
 
     def describe(self, station: int, values: Sequence[int | None]) -> Found:

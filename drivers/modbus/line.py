@@ -1,10 +1,10 @@
-"""One serial line as its master sees it: one question, one answer, one thread.
+"""Master of one serial line: one request, one answer, one thread.
 
-Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. Nothing is
-repeated here, because only the caller knows whether a repetition is harmless.
+Blocking code; `drivers.modbus.link.RegisterLink` runs it on the bus's thread. Nothing is repeated
+here, because only the caller knows whether a repetition is harmless.
 
-After a failed question its answer may still come; see `drivers.modbus.late` for how it is kept
-from being mistaken for another one.
+After a failed request its answer may still come; `drivers.modbus.late` prevents it from being
+mistaken for another one.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from drivers.modbus.port import LineSettings, Port, is_pseudo_terminal, open_por
 from drivers.modbus.timing import sleep_precisely
 from drivers.texts.message import Text, text
 
-#: A line that talks longer than this without a pause is no Modbus line at these settings.
+#: A line that sends longer than this without a pause is not a Modbus line at these settings.
 _BABBLE_S = 1.0
 
 
 @dataclass(slots=True)
 class Counters:
-    """What happened with one station since the line was opened first."""
+    """Counters of one station since the line was first opened."""
 
     transactions: int = 0
     timeouts: int = 0
@@ -58,8 +58,8 @@ class Counters:
 class Line:
     """Master of one serial line. Not thread-safe: one thread calls it.
 
-    ``on_change`` gets loss (False) and return (True) of the adapter, on the line's thread.
-    ``clock`` and ``sleep`` count seconds; ``opener`` makes the port: tests give their own.
+    ``on_change`` receives loss (False) and return (True) of the adapter, on the line's thread.
+    ``clock`` and ``sleep`` use seconds; ``opener`` creates the port: tests replace them.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Line:
         self.echo: bool | None = None
         self.losses = 0
         self.strays = 0
-        """How often something came that answered no question, such as an answer given up before."""
+        """Number of times that data without a matching request arrived, such as a late answer."""
         self._on_change = on_change
         self._clock = clock
         self._sleep = sleep
@@ -92,7 +92,7 @@ class Line:
 
     @property
     def is_open(self) -> bool:
-        """True while the adapter is there."""
+        """True while the adapter is available."""
         return self._port is not None
 
     def open(self) -> None:
@@ -100,7 +100,7 @@ class Line:
 
         Raises:
             LinkLost: no such port, no permission, in use.
-            OutOfRange: the adapter cannot do these settings.
+            OutOfRange: the adapter does not support these settings.
         """
         if self._port is not None:
             return
@@ -110,16 +110,16 @@ class Line:
         self.echo = None
         self._late.clear()
         self._last_failed = b""
-        self._restless = True  # bytes of a former life may be waiting
+        self._restless = True  # old bytes may be waiting
 
     def close(self) -> None:
-        """Close the adapter. Calling again does nothing."""
+        """Close the adapter. Further calls have no effect."""
         if self._port is not None:
             self._port.close()
             self._port = None
 
     def reopen(self) -> bool:
-        """Try to get a lost adapter back; True if it is open now."""
+        """Try to reopen a lost adapter; return whether it is open now."""
         if self._port is None:
             try:
                 self.open()
@@ -129,7 +129,7 @@ class Line:
         return True
 
     def read(self, station: int, start: int, count: int, timeout_s: float | None = None) -> bytes:
-        """Read ``count`` registers; returns 2 · count bytes, each register high byte first.
+        """Read ``count`` registers; return 2 · count bytes, each register high byte first.
 
         Raises:
             LinkTimeout, LinkLost, ProtocolError (damaged answer), Rejected, OutOfRange
@@ -137,9 +137,9 @@ class Line:
         return self._ask(read_query(station, start, count), timeout_s)[3:-2]
 
     def seek(self, station: int, start: int, count: int, timeout_s: float) -> bytes:
-        """`read` where perhaps nobody is.
+        """Read as `read`, at an address that may be unused.
 
-        The silence of an address that never answered is no fault of the line: it does not count.
+        The silence of an address that never answered is not a fault of the line and is not counted.
         """
         counters = self._count(station)
         before = replace(counters)
@@ -155,11 +155,12 @@ class Line:
     ) -> None:
         """Write one register (06) or several at once (16).
 
-        With ``at_any_rate`` (a stop) it is sent also where nothing could be asked: a drive whose
-        answers do not come, or come too late, may hear all the same. The error is raised then too.
+        With ``at_any_rate`` (a stop) it is sent even if the preceding check fails: a drive whose
+        answers do not come, or come too late, may still receive it. The error is raised
+        nevertheless.
 
         Raises:
-            LinkTimeout: no valid answer; whether the drive took the value is unknown.
+            LinkTimeout: no valid answer; whether the drive accepted the value is unknown.
             LinkLost, Rejected, OutOfRange
         """
         if len(words) == 1:
@@ -172,11 +173,11 @@ class Line:
             raise LinkTimeout("modbus.answer-station-write-came", station=station) from error
 
     def count_retry(self, station: int) -> None:
-        """Note that the caller repeats a read."""
+        """Count a read that the caller repeats."""
         self._count(station).retries += 1
 
     def quality(self, station: int | None) -> LinkQuality:
-        """Counters of one station or of all. Callable from any thread."""
+        """Return the counters of one station or of all. Callable from any thread."""
         if station is None:
             picked = list(self._counters.values())
         else:
@@ -266,7 +267,7 @@ class Line:
     def _await(
         self, port: Port, late: LateAnswers, query: Query, deadline: float
     ) -> tuple[Answer, bytes]:
-        """Collect bytes until the answer is there or cannot come any more."""
+        """Collect bytes until the answer is complete or cannot come any more."""
         data = port.read(deadline - self._clock())
         if self.echo is False and len(data) == query.length:
             answer = find_answer(data, query)  # the usual case: one portion, nothing else
@@ -283,14 +284,14 @@ class Line:
             own_echo_due = self.echo and not self._echo_taken
             if not own_echo_due and _looks_damaged(buffer, query, answer):
                 left = min(left, self.settings.gap_s)
-            # What came while this computer stood still is accepted all the same.
+            # Data that arrived while this computer was stalled are still accepted.
             data = port.read(max(left, 0.0)) if left > -_BABBLE_S else b""
             if not data:
                 return answer, bytes(buffer)
             buffer += data
 
     def _cut_echo(self, buffer: bytearray, query: Query) -> None:
-        """Remove our own bytes where the adapter hands them back (two-wire RS485)."""
+        """Remove our own bytes if the adapter echoes them (two-wire RS485)."""
         if self.echo is False or not buffer:
             return
         place = buffer.find(query.frame)
@@ -305,7 +306,7 @@ class Line:
     def _fail(
         self, query: Query, answer: Answer, received: bytes, counters: Counters, limit_s: float
     ) -> NoReturn:
-        """Say what happened."""
+        """Count the failure and raise its error."""
         self._last_failed = query.frame
         if received:
             self._restless = True
@@ -341,7 +342,7 @@ class Line:
     def _clear_the_way(
         self, port: Port, late: LateAnswers, query: Query, timeout_s: float | None
     ) -> None:
-        """So that what comes after the question is its answer."""
+        """Make sure that what follows the request is its answer."""
         self._settle(port)
         same_read_again = query.frame[1] == READ and query.frame == self._last_failed
         if late.pending(self._clock()) and not same_read_again:
@@ -351,7 +352,7 @@ class Line:
                 self._exchange(port, late, late.check(query), timeout_s)
 
     def _settle(self, port: Port) -> None:
-        """Throw away stray bytes; if there were any, wait until the line is silent."""
+        """Discard stray bytes; if there were any, wait until the line is silent."""
         if not self._restless:
             if not port.read(0.0):
                 return
@@ -371,7 +372,7 @@ class Line:
         """Make sure that no late answer can be mistaken for the one to ``query``.
 
         Raises:
-            LinkTimeout: no answer to the check, or none that proves anything; nothing was asked.
+            LinkTimeout: no answer to the check, or no conclusive one; the request was not sent.
         """
         for choose in (late.check, late.second_check):
             check = choose(query)
@@ -394,5 +395,5 @@ class Line:
 
 
 def _looks_damaged(buffer: bytearray, query: Query, answer: Answer) -> bool:
-    """True if what came is an answer that went wrong, not just noise before one."""
+    """Return whether the data are a damaged answer, not just noise before one."""
     return bool(answer.crc_errors) or len(buffer) >= query.length or buffer.startswith(query.head)

@@ -17,14 +17,14 @@ from profiles.schema import LinkKind
 
 
 def line_settings(url: BusUrl) -> LineSettings:
-    """Settings of the URL of a serial line, with the defaults of its kind.
+    """Return the settings in the URL of a serial line, with the defaults of its kind.
 
-    Modbus keeps the pause of the standard (3.5 characters, 1.75 ms above 19200 baud: MODBUS over
-    Serial Line V1.02, clause 2.5.1.1). MLink keeps 3.5 characters at every rate, because 1.75 ms
-    are 400 characters at 2.5 Mbaud.
+    Modbus uses the pause of the standard (3.5 characters, 1.75 ms above 19200 baud: MODBUS over
+    Serial Line V1.02, clause 2.5.1.1). MLink uses 3.5 characters at every rate, because 1.75 ms are
+    400 characters at 2.5 Mbaud.
 
     Raises:
-        OutOfRange: an option that does not exist or whose value makes no sense.
+        OutOfRange: an option that does not exist or has an invalid value.
     """
     usual = bus_kind(url.scheme).serial
     assert usual is not None, "a kind of bus with a serial line says how it is usually set"

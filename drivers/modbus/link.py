@@ -1,7 +1,7 @@
 """A serial bus of register-based drives as a `Link`: Modbus RTU, and MLink by another layout.
 
-Where a value lies among the registers is the business of a `Layout`; everything else (thread,
-batches, retries, loss and return of the adapter, scan) is the same for both.
+A `Layout` determines the registers of a value; everything else (thread, batches, retries, loss and
+return of the adapter, scan) is the same for both.
 """
 
 from __future__ import annotations
@@ -55,18 +55,18 @@ T = TypeVar("T")
 
 #: A job on the bus's thread yields to others after this time (and always after a failure).
 _TURN_S = 0.005
-#: A drive that says that it is busy is asked again after this time, then after twice as long.
+#: A drive that reports busy is queried again after this time, then after twice as long.
 _BUSY_S = 0.05
 _REOPEN_S = 0.25
 _STATIONS = range(1, 248)
 _ASKED_AGAIN = 4
-"""Silent addresses before something came that nobody asked for just then: one may be its sender."""
+"""Silent addresses queried again after an unexpected answer, which one of them may have sent."""
 _PLANS_KEPT = 256
 
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """Requests for one list of addresses; ``failed`` are those that never go on the line."""
+    """Requests for one list of addresses; ``failed`` are those that are never sent."""
 
     places: tuple[Place | None, ...]
     blocks: tuple[Block, ...]
@@ -75,14 +75,14 @@ class _Plan:
 
 @dataclass(slots=True)
 class _Batch:
-    """A read_many under way. Only the bus's thread changes it."""
+    """A read_many in progress. Only the bus's thread changes it."""
 
     plan: _Plan
     todo: deque[tuple[Block, int]]
     results: list[bytes | DriveError | None]
     silent_blocks: int = 0
     wait_s: float = 0.0
-    """Before its next turn: the drive said that it is busy."""
+    """Delay before its next turn [s], as the drive reported busy."""
 
 
 class RegisterLink:
@@ -126,7 +126,7 @@ class RegisterLink:
         return None
 
     async def enumerate(self, station: int, progress: Progress) -> list[Described]:
-        """See `drivers.link.Link.enumerate`: no drive lists anything over registers."""
+        """See `drivers.link.Link.enumerate`: no drive lists its objects over registers."""
         del progress
         raise lists_nothing(self.kind, station)
 
@@ -144,7 +144,7 @@ class RegisterLink:
         self._thread = thread
 
     async def close(self) -> None:
-        """Close the adapter. Calling again does nothing."""
+        """Close the adapter. Further calls have no effect."""
         thread, self._thread = self._thread, None
         if self._watcher is not None:
             self._watcher.cancel()
@@ -160,10 +160,11 @@ class RegisterLink:
         *,
         stop_after: int | None = None,
     ) -> list[Found]:
-        """Ask each address once (1 to 247 unless given) and identify those that answer.
+        """Query each address once (1 to 247 unless given) and identify those that answer.
 
-        A refusal counts as an answer. Where an answer seems to have come too late, those that it
-        may be of are asked again at the end. ``stop_after`` ends the search after so many drives.
+        A refusal counts as an answer. If an answer seems to have come too late, the addresses that
+        may have sent it are queried again at the end. ``stop_after`` ends the search after this
+        many drives.
         """
         found: list[Found] = []
         damaged: list[int] = []
@@ -176,7 +177,7 @@ class RegisterLink:
             share = max(share, number / (number + 1 + len(wanted)))
             progress(share, text("modbus.asking-address", station=station))
             number += 1
-            # Behind the last one nobody is kept waiting: late answers come in this time.
+            # After the last one no request follows: late answers arrive in this time.
             brief = wanted and station not in again
             limit_s = self._settings.scan_timeout_s if brief else self._settings.timeout_s
             there = await self._run(partial(self._is_there, station, limit_s))
@@ -205,11 +206,11 @@ class RegisterLink:
     async def read_many(
         self, station: int, addresses: Sequence[Address]
     ) -> list[bytes | DriveError]:
-        """Read several values, neighbours in one request where the layout allows it.
+        """Read several values, neighbours in one request if the layout allows it.
 
-        Only reads are repeated (``retries`` of the settings), also where the drive says that it is
-        busy, which leaves the line to others meanwhile. After two values without any
-        answer the rest fails at once instead of waiting for each.
+        Only reads are repeated (``retries`` of the settings), also if the drive reports busy, which
+        leaves the line free for others meanwhile. After two requests without any answer the rest
+        fails at once, without waiting for each time-out.
         """
         plan = self._plan(station, tuple(addresses))
         results: list[bytes | DriveError | None] = [None] * len(plan.places)
@@ -223,7 +224,7 @@ class RegisterLink:
         return [_decided(result) for result in results]
 
     async def write(self, station: int, address: Address, data: bytes) -> None:
-        """Write one value; goes before all waiting reads. See `drivers.link.Link.write`."""
+        """Write one value; precedes all waiting reads. See `drivers.link.Link.write`."""
         place = self._layout.place(station, address)
         words = to_words(place, data)
         stop = is_stop(address.index, address.subindex, data)
@@ -231,11 +232,11 @@ class RegisterLink:
         await self._run(write, urgent=True)
 
     def quality(self, station: int | None = None) -> LinkQuality:
-        """Counters. See `drivers.link.Link.quality`."""
+        """Return the counters. See `drivers.link.Link.quality`."""
         return self._line.quality(station)
 
     def listen(self, listener: Callable[[LinkEvent], None]) -> Unsubscribe:
-        """Be notified of loss and return of the adapter."""
+        """Subscribe to loss and return of the adapter."""
         self._listeners.append(listener)
 
         def unsubscribe() -> None:
@@ -246,7 +247,7 @@ class RegisterLink:
 
     @property
     def frames(self) -> RegisterLink:
-        """It keeps the last minute of its frames."""
+        """The link itself, which keeps the last minute of its frames."""
         return self
 
     async def flight(self, station: int | None = None) -> bytes:
@@ -291,7 +292,7 @@ class RegisterLink:
             batch.todo.appendleft((block, attempt + 1))
             return
         if isinstance(error, Rejected) and not busy and len(block.items) > 1:
-            # One register in it is refused: ask one by one, now and from now on.
+            # One of its registers is refused: read them one by one, now and later.
             self._refused_blocks.add((station, block.start, block.count))
             self._plans.clear()
             batch.todo.extendleft(
@@ -314,7 +315,7 @@ class RegisterLink:
             batch.todo.clear()
 
     def _is_there(self, station: int, limit_s: float) -> bool | None:
-        """True if it answers, False if not, None if something comes that is no good answer."""
+        """Return True if it answers, False if not, None if only damaged answers come."""
         place = self._layout.place(station, self._layout.identity()[0])
         for _ in range(2):
             try:
@@ -364,7 +365,7 @@ class RegisterLink:
         return self._layout.describe(station, values)
 
     def _plan(self, station: int, addresses: tuple[Address, ...]) -> _Plan:
-        """The requests for these addresses; kept, because pollers ask for the same again."""
+        """Return the requests for these addresses; cached, because pollers repeat them."""
         plan = self._plans.get((station, addresses))
         if plan is None:
             if len(self._plans) >= _PLANS_KEPT:
@@ -396,7 +397,7 @@ class RegisterLink:
 
 
 def _singles(places: tuple[Place | None, ...], block: Block) -> list[Block]:
-    """The values of a block, each in a request of its own."""
+    """Return the values of a block, each in a request of its own."""
     found: list[Block] = []
     for item in block.items:
         place = places[item]
@@ -413,7 +414,7 @@ def _summary(found: Sequence[Found], damaged: Sequence[int]) -> Text:
 
 
 def _again(error: DriveError) -> DriveError:
-    """The same error as a new object: callers fill in which parameter it was about."""
+    """Copy an error: callers add the parameter concerned."""
     if isinstance(error, Rejected):
         return Rejected(error.text, abort_code=error.abort_code, remedy=error.remedy_text)
     return type(error)(
@@ -428,5 +429,5 @@ def _decided(result: bytes | DriveError | None) -> bytes | DriveError:
 
 
 def modbus_link(url: str, settings: LineSettings) -> RegisterLink:
-    """A Modbus RTU bus, not yet opened."""
+    """Create the link of a Modbus RTU bus without opening it."""
     return RegisterLink(url, settings, TableLayout())

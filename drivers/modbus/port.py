@@ -1,7 +1,8 @@
-"""The serial port under a line: opened by pyserial, read and written as directly as possible.
+"""The serial port of a line: opened by pyserial, read and written as directly as possible.
 
-On POSIX the bytes go through the file descriptor with ``poll``; pyserial's own read costs three
-times as much per answer. Elsewhere pyserial's read and write are used. Foreign errors end here.
+On POSIX the bytes go through the file descriptor with ``poll``; pyserial's own read takes three
+times as long per answer. Elsewhere pyserial's read and write are used. Foreign exceptions are
+translated here.
 """
 
 from __future__ import annotations
@@ -32,12 +33,12 @@ STANDARD_SILENCE_S = 0.00175
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """How a serial line is opened and timed.
+    """Settings and timing of a serial line.
 
-    ``timeout_s`` is what a drive may take to start its answer, beyond the time that the bytes
-    need on the wire. ``silence_s`` is the pause before each request; None means 3.5 character
-    times. ``gap_s`` is how long a started answer may pause (USB adapters deliver in portions up
-    to 16 ms apart). ``late_s`` is how long after a time-out its answer may still come.
+    ``timeout_s`` is the time in which a drive must start its answer, in addition to the time of the
+    bytes on the wire. ``silence_s`` is the pause before each request; None means 3.5 character
+    times. ``gap_s`` is the longest pause within an answer (USB adapters deliver in portions up to
+    16 ms apart). ``late_s`` is how long after a time-out its answer may still come.
     """
 
     device: str
@@ -63,29 +64,30 @@ class LineSettings:
 
     @property
     def pause_s(self) -> float:
-        """Pause kept before each request."""
+        """Pause before each request."""
         return 3.5 * self.char_s if self.silence_s is None else self.silence_s
 
 
 class Port(Protocol):
-    """Bytes in and out. All raise LinkLost when the adapter is gone."""
+    """Bytes in and out. All methods raise LinkLost when the adapter is gone."""
 
     def read(self, timeout_s: float) -> bytes:
-        """Bytes that are there, waiting up to ``timeout_s`` for the first; empty if none came."""
+        """Return the bytes received, waiting up to ``timeout_s`` for the first; empty if none."""
 
     def write(self, data: bytes) -> None:
         """Send all of ``data``."""
 
     def close(self) -> None:
-        """Give the port back. Calling again does nothing."""
+        """Release the port. Further calls have no effect."""
 
 
 def open_port(settings: LineSettings) -> Port:
     """Open the adapter named in ``settings``.
 
     Raises:
-        LinkLost: no such port, no serial port, no permission, in use.
-        OutOfRange: the adapter cannot do this baud rate or parity, or its name is of no port.
+        LinkLost: no such port, not a serial port, no permission, in use.
+        OutOfRange: the adapter does not support this baud rate or parity, or its name is not a
+            port's.
     """
     device = serial_device(settings.device)
     parity = "N" if is_pseudo_terminal(device) else settings.parity
@@ -101,10 +103,10 @@ def open_port(settings: LineSettings) -> Port:
         )
     except ValueError as error:
         raise _unsuitable(settings, str(error)) from error
-    except OSError as error:  # SerialException is one
+    except OSError as error:  # includes SerialException
         raise _explain(settings, error) from error
     except TERMINAL_ERRORS as error:
-        # An adapter that goes while it is being set up.
+        # An adapter that is unplugged while it is being set up.
         raise _gone(settings.device, error) from error
     deliver_soon(port)
     return (
@@ -113,7 +115,7 @@ def open_port(settings: LineSettings) -> Port:
 
 
 def is_pseudo_terminal(device: str) -> bool:
-    """True if ``device`` leads to a pty: it carries bytes, not bits, and so has no parity."""
+    """Return whether ``device`` leads to a pty: it transfers bytes and so has no parity."""
     return str(Path(device).resolve()).startswith("/dev/pts/")
 
 
@@ -163,7 +165,7 @@ class _PosixPort:
             return b""
         except OSError as error:
             raise _gone(self._device, error) from error
-        if not data:  # readable and yet nothing: hung up
+        if not data:  # readable, but no data: hung up
             raise _gone(self._device, None)
         return data
 

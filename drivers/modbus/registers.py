@@ -1,7 +1,7 @@
-"""Where objects lie among 16-bit registers, and which registers to read together. Pure functions.
+"""Position of objects among 16-bit registers, and which registers to read together. Pure.
 
-Each register travels high byte first (MODBUS Application Protocol V1.1b3, clause 4.2); which
-of the two registers of a 32-bit value comes first differs between makers and is part of a `Place`.
+Each register is sent high byte first (MODBUS Application Protocol V1.1b3, clause 4.2); which of the
+two registers of a 32-bit value comes first differs between manufacturers and is part of a `Place`.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ class Place:
 
     @property
     def end(self) -> int:
-        """First register behind the value."""
+        """First register after the value."""
         return self.start + self.count
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Registers that one request reads, and the positions of the asked values it covers."""
+    """Registers that one request reads, and the positions of the requested values in it."""
 
     start: int
     count: int
@@ -46,10 +46,10 @@ class Block:
 
 
 def words_of(data_type: DataType) -> int:
-    """Number of registers of a type.
+    """Return the number of registers of a type.
 
     Raises:
-        NotAllowed: text, octets and BOOL-packed arrays have no fixed place in registers.
+        NotAllowed: the type has no fixed length (text, octets).
     """
     size = size_of(data_type)
     if size is None:
@@ -58,10 +58,10 @@ def words_of(data_type: DataType) -> int:
 
 
 def to_bytes(place: Place, registers: bytes) -> bytes:
-    """Registers as they came over the line to the value's little-endian bytes.
+    """Convert registers as received to the value's little-endian bytes.
 
     Raises:
-        ProtocolError: an 8-bit value came with a high byte that does not belong to it.
+        ProtocolError: an 8-bit value has a high byte that does not belong to it.
     """
     if place.count == 1:
         if size_of(place.type) != 1:
@@ -85,7 +85,7 @@ def to_bytes(place: Place, registers: bytes) -> bytes:
 
 
 def to_words(place: Place, data: bytes) -> tuple[int, ...]:
-    """A value's little-endian bytes to register values, in the order of their addresses.
+    """Convert a value's little-endian bytes to registers, in the order of their addresses.
 
     Raises:
         ProtocolError: the length does not fit the type.

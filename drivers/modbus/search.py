@@ -1,4 +1,4 @@
-"""Find out how a serial line is set, where that is no longer known (or no manual prints it)."""
+"""Search for the settings of a serial line that are unknown (or not in a manual)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.texts.message import Text, text
 
 @dataclass(frozen=True, slots=True)
 class LineFound:
-    """The URL with the settings at which something answered, and what did."""
+    """The URL with the settings at which drives answered, and these drives."""
 
     url: str
     drives: tuple[Found, ...]
@@ -29,20 +29,20 @@ async def search_line_settings(
     parities: Sequence[Parity] = (),
     stations: Sequence[int] = (1,),
 ) -> LineFound | None:
-    """Try baud rates and parities until a drive answers with a right CRC; None if none does.
+    """Try baud rates and parities until a drive answers with a correct CRC; None if none does.
 
-    Only reads go out. Ask few stations: the time is the product of all three lists and of one
-    time-out. Rates that the adapter cannot do are skipped. Cancel by cancelling the task.
+    Only reads are sent. Query few stations: the time is the product of the three lists and one
+    time-out. Rates that the adapter does not support are skipped. Cancel by cancelling the task.
 
     Raises:
-        LinkLost: the adapter is missing, in use, or pulled during the search.
+        LinkLost: the adapter is missing, in use, or unplugged during the search.
     """
     usual = kind.serial
     assert usual is not None, "only a serial line has settings to search for"
     rates = baudrates or usual.baudrates
     kinds: Sequence[str] = parities or usual.parities
     if is_pseudo_terminal(bus.place):
-        kinds = kinds[:1]  # no bits, no parity: the others would be the same again
+        kinds = kinds[:1]  # no bits, no parity: the others would give the same result
     settings = [(rate, parity) for rate in rates for parity in kinds]
     for number, (rate, parity) in enumerate(settings):
         progress(
@@ -65,4 +65,4 @@ async def search_line_settings(
 
 
 def _quiet(_fraction: float, _text: Text) -> None:
-    """A scan of few stations inside a search needs no progress of its own."""
+    """Ignore progress: a scan of few stations inside a search needs none of its own."""

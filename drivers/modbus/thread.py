@@ -1,4 +1,4 @@
-"""The one thread of a bus: runs blocking jobs one at a time, urgent ones first."""
+"""The single thread of a bus: runs blocking jobs one at a time, urgent ones first."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ T = TypeVar("T")
 class BusThread:
     """Jobs from the event loop, executed in order on one thread.
 
-    An urgent job (a write: it may be the stop) overtakes every job that has not begun. Long
-    work must come as many short jobs for this to mean anything.
+    An urgent job (a write: it may be the stop) overtakes every job that has not begun. Long work
+    must be split into many short jobs for this to be effective.
     """
 
     def __init__(self, name: str) -> None:
@@ -46,7 +46,7 @@ class BusThread:
         return await asyncio.wrap_future(future)
 
     def stop(self) -> None:
-        """Take no more jobs; those that wait are still done."""
+        """Accept no more jobs; those waiting are still executed."""
         self._executor.shutdown(wait=False)
 
     def _next(self) -> None:

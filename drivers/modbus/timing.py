@@ -1,15 +1,15 @@
-"""Pauses of some microseconds, as serial lines at megabauds need them."""
+"""Pauses of some microseconds, as required by serial lines at megabaud rates."""
 
 from __future__ import annotations
 
 import time
 
-#: What a sleep oversleeps with fine timers, measured on several machines.
+#: Excess duration of a sleep with fine timers, measured on several machines.
 _OVERSLEEP_S = 40e-6
 
 
 def sleep_precisely(seconds: float) -> None:
-    """Sleep, and wait out the last 40 µs awake: a pause at 2.5 Mbaud lasts 15 µs in all.
+    """Sleep, and wait actively for the last 40 µs: a pause at 2.5 Mbaud lasts only 15 µs.
 
     Even ``time.sleep(0)`` would take longer than that.
     """

@@ -1,1 +1,1 @@
-"""What the cyclic buses share of moving an axis."""
+"""Axis motion shared by the cyclic buses: loop, setpoints, envelope."""

@@ -1,4 +1,4 @@
-"""The speed of one motion, watched by 606Ch and by the position: each must agree with the other."""
+"""Speed monitoring of one motion by 606Ch and by position, with a check that both agree."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from drivers.halt import HaltCause, Halted
 
 
 class SpeedGuard:
-    """For one motion. ``limit`` is the speed limit in raw 606Ch, None where there is none.
+    """Monitors one motion. ``limit`` is the speed limit in raw 606Ch, None for no limit.
 
-    By the position the axis is too fast beyond ``margin`` times the limit: samples are not quite
-    equally far apart.
+    The speed by position is too high above ``margin`` times the limit, because samples are not
+    exactly equally spaced.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class SpeedGuard:
         self._margin = margin
 
     def look(self, position: int | None, velocity: float | None, at_s: float) -> Halted | None:
-        """Why one sample of raw 6064h and 606Ch at a time [s] ends the motion; None: it goes on."""
+        """Check one sample of raw 6064h and 606Ch at a time [s]; return why it ends the motion."""
         watch, limit = self._watch, self._limit
         certain = None
         if watch is not None and position is not None and velocity is not None:
@@ -47,12 +47,12 @@ class SpeedGuard:
         return Halted.beyond("speed", seen, limit) if denied is None else _of(denied)
 
     def gap(self) -> None:
-        """Cycles were skipped: the two are not compared across them."""
+        """Note that cycles were skipped: nothing is compared across the gap."""
         if self._watch is not None:
             self._watch.gap()
 
     def interrupt(self) -> None:
-        """The position was set again, or samples are missing: nothing is compared across that."""
+        """Restart the comparison: the position was set anew, or samples are missing."""
         if self._watch is not None:
             self._watch.interrupt()
 

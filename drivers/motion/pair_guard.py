@@ -1,7 +1,7 @@
-"""Two axes of one machine in the cyclic loop: neither goes on alone, and their skew has a limit.
+"""Two coupled axes in the cyclic loop: both stop together, and their skew is limited.
 
-Pure: `PairGuard.look` is called once in each cycle, after both axes have decided. What it stops
-begins to brake with the outputs of the next cycle.
+Pure: `PairGuard.look` is called once per cycle, after both axes have processed their inputs. An
+axis that it stops begins to brake with the outputs of the next cycle.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ _MOVED = (Phase.PLAYING, Phase.HOLDING)
 
 @dataclass(frozen=True, slots=True)
 class SkewLimit:
-    """``skew_max`` [increments of the first axis] that the difference of both positions may change
-    by since ``zero`` [increments of each]; one increment of the second axis is ``ratio`` of the
-    first, negative where they count against each other.
+    """Limit of the skew between two axes.
+
+    The difference of both positions may change by ``skew_max`` [increments of the first axis] since
+    ``zero`` [increments of each]; one increment of the second axis is ``ratio`` of the first,
+    negative if they count in opposite directions.
     """
 
     zero: tuple[int, int]
@@ -27,12 +29,12 @@ class SkewLimit:
     skew_max: float
 
     def skew(self, first: int, second: int) -> float:
-        """Difference of both ways [increments of the first axis]."""
+        """Return the difference of both travels [increments of the first axis]."""
         return (first - self.zero[0]) - self.ratio * (second - self.zero[1])
 
 
 class PairGuard:
-    """Watches two axes from the cycle in which they begin together."""
+    """Monitors two axes from the cycle in which they start together."""
 
     def __init__(self, axes: tuple[AxisLoop, AxisLoop], limit: SkewLimit) -> None:
         self.axes = axes
@@ -40,11 +42,11 @@ class PairGuard:
 
     @property
     def over(self) -> bool:
-        """Neither axis is moved by setpoints any more."""
+        """True when neither axis is moved by setpoints any more."""
         return all(axis.phase is Phase.IDLE for axis in self.axes)
 
     def look(self) -> None:
-        """Stop both where one was stopped or the skew is beyond its limit."""
+        """Stop both axes if one was stopped or if the skew exceeds its limit."""
         positions = [axis.position for axis in self.axes]
         if None not in positions:
             skew = self._limit.skew(positions[0] or 0, positions[1] or 0)

@@ -1,14 +1,18 @@
 """One axis in the cyclic loop: control word, setpoints, expiry and envelope.
 
-Pure: `AxisLoop.step` gets the inputs of a cycle and leaves the outputs of the next one in
-``outputs``. It never sleeps, never raises for what a drive does, and reports through ``report``.
+Pure: `AxisLoop.step` takes the inputs of a cycle and leaves the outputs of the next one in
+``outputs``. It never sleeps, never raises for anything a drive does, and reports through
+``report``.
 
-Whatever ends a motion by force (expiry, envelope, halt, invalid data) brakes and then leaves
+Every forced end of a motion (expiry, envelope, halt, invalid data) brakes and then leaves
 Operation enabled. Position and velocity setpoints are ramped down in `STOP_S`; a torque setpoint
-becomes zero with a quick stop, because no torque does not stop an axis that moves. An axis that
-could not follow the ramp is handed to the drive's quick stop too: without power it would coast.
-Against a closed brake a torque beyond a limit becomes zero only, and the power goes `LET_GO_S`
-later: a quick stop by a speed loop would push on (R6L, EP3E and M6-L take 50 ms to 1 s for it).
+becomes zero together with a quick stop, because zero torque does not stop a moving axis. An axis
+that could not follow the ramp is stopped by the drive's quick stop too: without power it would
+coast.
+
+With a closed brake, a torque beyond a limit only becomes zero, and the power is removed `LET_GO_S`
+later: a quick stop by a velocity loop would keep pushing (R6L, EP3E and M6-L take 50 ms to 1 s for
+it).
 """
 
 from __future__ import annotations
@@ -41,27 +45,30 @@ from drivers.texts.message import Text, text
 from drivers.texts.states import state_text
 
 STOP_S = 0.1
-"""From any speed to standstill; shorter than the 200 ms in which a lost setpoint must end."""
+"""Ramp time from any speed to standstill [s]; below the 200 ms in which lost setpoints must end."""
 LET_GO_S = 0.05
-"""Until the power goes from an axis that its closed brake holds and that no torque drives."""
+"""Delay until the power of an axis held by its closed brake, with zero torque, is removed [s]."""
 
 _RESTLESS = 2
-"""Increments per cycle that encoder noise may make of an axis at standstill."""
+"""Encoder noise of an axis at standstill, in increments per cycle."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
 _PAUSED = Halted(HaltCause.COMMANDED, note=text("cyclic.motion-ended"))
 _RESTLESS_STILL = Halted(HaltCause.COMMANDED, note=text("cyclic.not-come-rest-ramp"))
 _STALE_CYCLES = 3
-"""Samples that may be older than what a mailbox reported before an axis was enabled again."""
+"""Samples that may be older than a state a mailbox reported before the axis was enabled again."""
 _SETTLES = 2
-"""An axis that lags behind its ramp may take so many times its length longer to be held."""
+"""An axis that lags behind its ramp may take this many ramp times longer to come to a hold."""
 _REST_S, _GIVE_UP = 0.05, 30
-"""An axis rests after so long without motion; after so many times as long nobody waits for it."""
+"""Dwell without motion that counts as standstill [s]; time-out as a multiple of this dwell."""
 
 
 class AxisLoop:
-    """See the module. ``inputs`` and ``outputs`` name the positions of CiA 402 objects."""
+    """Cyclic loop of one axis, see the module docstring.
+
+    ``inputs`` and ``outputs`` map the index of a CiA 402 object to its place in the values.
+    """
 
     def __init__(
         self,
@@ -80,7 +87,7 @@ class AxisLoop:
         self.state = State.UNKNOWN
         self.goal: State | None = None
         self.halted: Halted | None = None
-        """Why the last motion was ended by force, or why the drive is not enabled any more."""
+        """Why the last motion was ended by force, or why the drive is no longer enabled."""
         self._in = inputs
         self._out = outputs
         self._report = report
@@ -108,7 +115,7 @@ class AxisLoop:
         self._stale = 0
         self._last_position: int | None = None
         self._moved = 0
-        """Increments since the cycle before."""
+        """Increments moved since the previous cycle."""
         self._moved_at_stop = 0
         self._cycle_s = cycle_s
         self._cycles = 0
@@ -117,22 +124,23 @@ class AxisLoop:
 
     @property
     def position(self) -> int | None:
-        """Actual position [increments] of the last trusted cycle; None before there was one."""
+        """Actual position [increments] of the last valid cycle; None before the first."""
         return self._last_position
 
     # Commands ------------------------------------------------------------------------------
 
     def drive_to(self, goal: State, mode: int | None) -> None:
-        """Head for a power state; leaving Operation enabled brakes first.
+        """Request a power state; leaving Operation enabled brakes first.
 
         Raises:
-            NotAllowed: the control word is not in the process data, or the axis is in a fault.
+            NotAllowed: the control word is not mapped, the axis is in a fault or braking, or the
+                mode would change during a motion.
         """
         if CONTROL not in self._out:
             raise NotAllowed("cyclic.station-control-word-not", station=self.station)
         if goal is State.OPERATION_ENABLED:
             if self.goal is not State.OPERATION_ENABLED:
-                # That samples are older than its disabling is no reason to stay disabled.
+                # Samples from before the last disabling must not keep the axis disabled.
                 self._was_enabled, self._stale = False, _STALE_CYCLES
             if self.state in (State.FAULT, State.FAULT_REACTION):
                 raise NotAllowed("cyclic.station-fault-cannot-enabled", station=self.station)
@@ -161,10 +169,10 @@ class AxisLoop:
         self.halted = None
 
     def play(self, motion: Motion) -> None:
-        """Begin with the first value in the next cycle.
+        """Start a motion with its first value in the next cycle.
 
         Raises:
-            NotAllowed: not enabled, something needed is not mapped, or the first value is a jump.
+            NotAllowed: not enabled, a required object is not mapped, or the first value is a jump.
         """
         self.check(motion)
         self._motion = motion
@@ -175,15 +183,15 @@ class AxisLoop:
         self._speed_guard = SpeedGuard(motion.limits.feedback, motion.limits.speed_max)
 
     def renew(self) -> None:
-        """Extend the life of the setpoints."""
+        """Extend the validity of the setpoints."""
         if self._motion is not None:
             self._life = self._motion.renew_cycles
 
     def stop(self, why: Halted, goal: State = State.READY) -> None:
-        """Brake now, then head for ``goal``."""
+        """Brake now, then go to the power state ``goal``."""
         if self.phase is Phase.BRAKING:
             if self._after_brake is State.OPERATION_ENABLED:
-                # It braked to hold on; now its motion is over.
+                # It was braking in order to hold; now its motion is ended.
                 self.halted, self._after_brake = why, goal
                 self._report(self.station, why.text)
             return
@@ -207,9 +215,9 @@ class AxisLoop:
         self._begin_to_brake(motion, goal)
 
     def pause(self) -> None:
-        """Brake now and hold, enabled; the motion is over, but another one may begin at once.
+        """Brake now and hold, enabled; the motion ends, and another may start at once.
 
-        For setpoints of position and speed; one of torque ends as by `stop`.
+        For position and velocity setpoints; a torque motion ends as by `stop`.
         """
         if self.phase not in (Phase.PLAYING, Phase.HOLDING):
             return
@@ -233,9 +241,9 @@ class AxisLoop:
     # One cycle -----------------------------------------------------------------------------
 
     def step(self, values: Sequence[int], late_s: float = 0.0) -> None:
-        """Outputs of the next cycle from the inputs of this one, which must be valid.
+        """Compute the outputs of the next cycle from the inputs of this one, which must be valid.
 
-        ``late_s``: by how much the inputs were sampled after their place in the grid of cycles.
+        ``late_s`` [s]: delay of the input sampling relative to the grid of cycles.
         """
         self._cycles += 1
         self._sampled_s = self._cycles * self._cycle_s + late_s
@@ -264,10 +272,11 @@ class AxisLoop:
             self._control()
 
     def blind(self) -> None:
-        """A cycle without trusted inputs: setpoints go on, nothing is concluded from inputs.
+        """Advance one cycle without valid inputs: setpoints continue, inputs are not evaluated.
 
-        Once it has braked, a quick stop is commanded whether or not it is heard: nobody knows
-        whether it stands, and disabled by other words it would coast.
+        Once the axis has braked, a quick stop is commanded whether or not the drive receives it: it
+        is unknown whether the axis is at standstill, and disabled by another control word it would
+        coast.
         """
         self._cycles += 1
         if self.phase is not Phase.IDLE:
@@ -280,10 +289,9 @@ class AxisLoop:
                 self.outputs[self._out[CONTROL]] = self._dialect.quick_stop
 
     def skip(self, cycles: int) -> None:
-        """Cycles that the computer was too late for: time passed, and nothing was exchanged.
+        """Account for cycles that the computer missed: time passed without an exchange.
 
-        Setpoints grow older by all of them; an axis whose setpoints expired brakes in the next
-        cycle.
+        Setpoints age by all of them; an axis whose setpoints expired brakes in the next cycle.
         """
         self._cycles += cycles
         self._life -= cycles
@@ -312,7 +320,7 @@ class AxisLoop:
         return LeftBy.OTHERS
 
     def _guard(self, values: Sequence[int]) -> None:
-        """Envelope and expiry; a violation begins to brake in this very cycle."""
+        """Check envelope and expiry; a violation starts braking in the same cycle."""
         assert self._motion is not None
         if self._age(1):
             return
@@ -342,7 +350,7 @@ class AxisLoop:
                 self.stop(Halted.beyond("following error", error, limits.following_error_max))
 
     def _age(self, cycles: int) -> bool:
-        """Whether setpoints that nobody renewed are too old now; the axis then brakes."""
+        """Age the setpoints; return whether they expired without renewal, which brakes the axis."""
         self._life -= cycles
         expired = self._life < 0
         if expired:
@@ -350,9 +358,10 @@ class AxisLoop:
         return expired
 
     def _no_faster_than_it_turns(self, values: Sequence[int]) -> None:
-        """What does not follow (a blocked axis) is braked from its own speed, not that of the ramp.
+        """Brake an axis that does not follow (a blocked axis) from its actual speed, not the
+        setpoint's.
 
-        Else its loop would push on, and with more and more torque, for as long as it brakes.
+        Otherwise its loop would keep pushing, with increasing torque, for as long as it brakes.
         """
         assert self._motion is not None
         actual = self._value(values, ACTUAL_VELOCITY)
@@ -371,7 +380,7 @@ class AxisLoop:
     def _setpoints(self, values: Sequence[int], *, enabled: bool) -> None:
         if self.phase is Phase.IDLE:
             if not enabled:
-                # Enabling must never move: the setpoint waits where the axis is.
+                # Enabling must never cause motion: the setpoint is kept at the actual position.
                 actual = self._value(values, ACTUAL_POSITION)
                 if actual is not None:
                     self._set(POSITION, round(actual))
@@ -417,7 +426,7 @@ class AxisLoop:
             self._speed = 0.0
             self.goal = self._after_brake
             if self._moved > max(0.1 * self._moved_at_stop, _RESTLESS):
-                # What did not follow its ramp is not held either.
+                # An axis that did not follow its ramp cannot be held either.
                 held = self._after_brake is State.OPERATION_ENABLED
                 self.goal = State.QUICK_STOP_ACTIVE
                 self._after_quick_stop = State.READY if held else self._after_brake
@@ -426,7 +435,7 @@ class AxisLoop:
                     self._report(self.station, _RESTLESS_STILL.text)
 
     def _lags_behind(self) -> bool:
-        """Whether an axis that is to be held still follows its ramp, within the time for that."""
+        """Return whether an axis to be held still lags behind its ramp, within the time allowed."""
         held = self._after_brake is State.OPERATION_ENABLED
         patient = self._brake_left > -_SETTLES * self._stop_cycles
         return held and patient and self._moved > max(0.1 * self._moved_at_stop, _RESTLESS)
@@ -443,7 +452,7 @@ class AxisLoop:
             self.outputs[place] = cia402.DISABLE_VOLTAGE
             return
         if self._brakes_itself:
-            # A limit switch or the drive itself began a quick stop: power is what it brakes with.
+            # A limit switch or the drive itself began a quick stop, which needs power for braking.
             if self.state is State.QUICK_STOP_ACTIVE and self._may_brake():
                 self.outputs[place] = self._dialect.quick_stop
                 return
@@ -467,14 +476,14 @@ class AxisLoop:
             self.outputs[place] &= ~cia402.FAULT_RESET
 
     def _stops_unseen(self) -> bool:
-        """Whether a drive whose status word shows no quick stop may still be at it.
+        """Return whether a drive whose status word shows no quick stop may still be braking.
 
-        Any other word would take its power away while it brakes.
+        Any other control word would remove its power while it brakes.
         """
         return self._dialect.echoes_control and self._may_brake()
 
     def _may_brake(self) -> bool:
-        """Whether the axis did not rest long enough yet, within the time that is waited for it."""
+        """Return whether the axis may still move: no standstill dwell yet, and no time-out."""
         self._stopping += 1
         self._rested = self._rested + 1 if self._moved <= _RESTLESS else 0
         if self._rested < self._rest_cycles and self._stopping < _GIVE_UP * self._rest_cycles:
@@ -486,15 +495,15 @@ class AxisLoop:
 
     @property
     def _why(self) -> str:
-        """For messages: why the last motion was ended by force, empty where it was not."""
+        """Why the last motion was ended by force, for messages; empty if it was not."""
         return "" if self.halted is None else self.halted.words
 
     def setpoint_now(self, target: int) -> int | None:
-        """The value of a target in the outputs, None where it is not mapped."""
+        """Return the output value of a target, or None if it is not mapped."""
         return self.outputs[self._out[target]] if target in self._out else None
 
     def check(self, motion: Motion) -> None:
-        """Raise `NotAllowed` if this motion cannot begin in the next cycle."""
+        """Raise `NotAllowed` if this motion cannot start in the next cycle."""
         where = f"station {self.station}"
         motion.require_mapped(self._out, where)
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:

@@ -1,4 +1,4 @@
-"""A motion as the cyclic loop plays it: setpoints cycle by cycle within an envelope."""
+"""A motion for the cyclic loop: setpoints cycle by cycle within an envelope."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from drivers.errors import NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.texts.message import text
 
-#: The objects of CiA 402-2 that a motion commands and watches.
+#: The CiA 402-2 objects that a motion commands and monitors.
 CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
 OFFSETS = (0x60B0, 0x60B1, 0x60B2)
 STATUS, MODE_SHOWN = 0x6041, 0x6061
@@ -22,7 +22,7 @@ MODE_OF = {POSITION: cia402.Mode.CSP, VELOCITY: cia402.Mode.CSV, TORQUE: cia402.
 
 
 class Phase(Enum):
-    """What the setpoints of an axis do."""
+    """State of the setpoints of an axis."""
 
     IDLE = "idle"
     PLAYING = "playing"
@@ -41,13 +41,16 @@ class Limits:
     following_error_max: float | None = None
     feedback: FeedbackScale | None = None
     torque_off_only: bool = False
-    """A torque beyond a limit becomes zero without a quick stop."""
+    """Beyond a limit a torque only becomes zero, without a quick stop."""
 
     def require_watched(self, inputs: Container[int], where: str) -> None:
-        """Every limit has its value among these objects of the cyclic data.
+        """Check that the actual value of each limit is among these objects of the cyclic data.
+
+        The following error is not checked: where 60F4h is missing, the loop computes it from the
+        position.
 
         Raises:
-            NotAllowed: one has not.
+            NotAllowed: one is missing.
         """
         compared = self.feedback
         for name, index, limit in (
@@ -65,7 +68,7 @@ class Limits:
 
 
 def limits_of(message: Mapping[str, Any]) -> Limits:
-    """The envelope as it came from the server's process, as plain values."""
+    """Create the envelope from the plain values sent by the server's process."""
     feedback = message.get("feedback")
     scale = None if feedback is None else FeedbackScale(**feedback)
     return Limits(**{**message, "feedback": scale})
@@ -73,19 +76,19 @@ def limits_of(message: Mapping[str, Any]) -> Limits:
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """One value per cycle for one target, and the same for one offset."""
+    """One value per cycle for one target and, optionally, for one offset."""
 
     target: int
     values: array.array[int]
     limits: Limits
     renew_cycles: int
     longest_step: int
-    """Largest change between two values, found by the server: the loop has no time for it."""
+    """Largest change between two values, computed by the server, as the loop lacks the time."""
     offset: int | None = None
     offset_values: array.array[int] | None = None
 
     def require_mapped(self, outputs: Container[int], where: str) -> None:
-        """Target and offset are among these objects of the cyclic data.
+        """Check that target and offset are among these objects of the cyclic data.
 
         Raises:
             NotAllowed: one is not.
@@ -95,12 +98,12 @@ class Motion:
                 raise NotAllowed("cyclic.not-cyclic-data", where=where, index=index)
 
     def require_near(self, now: int, speed: float, where: str) -> None:
-        """The first position is no further away than the longest step that follows.
+        """Check that the first position is no further away than the longest step that follows.
 
         ``now`` is the setpoint [increments] and ``speed`` its change in the last cycle.
 
         Raises:
-            NotAllowed: it is: the axis would jump.
+            NotAllowed: it is further away, so the axis would jump.
         """
         first = self.values[0]
         longest = max(self.longest_step, abs(round(speed)), 1)

@@ -1,4 +1,4 @@
-"""What every bus requires of a trajectory before anything moves."""
+"""Checks of a trajectory, common to all buses, before anything moves."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from drivers.errors import NotAllowed, OutOfRange
 from drivers.link import Address, Trajectory
 from profiles.schema import INTEGER_RANGE
 
-#: Targets of cyclic motion (CiA 402-2: CSP, CSV, CST) and the limit that bounds each.
+#: Targets of cyclic motion (CiA 402-2: CSP, CSV, CST) and the limit that applies to each.
 TARGETS = {0x607A: "position", 0x60FF: "velocity", 0x6071: "torque"}
 
 
 def require_fits(trajectory: Trajectory) -> None:
-    """Every value fits its object, and each has its offset where there are any.
+    """Check that every value fits its object, and that offsets, if any, match in number.
 
     Raises:
-        NotAllowed: no setpoint for cyclic motion.
+        NotAllowed: the target is not a setpoint of cyclic motion.
         OutOfRange: a value does not fit, or values and offsets differ in number.
     """
     if trajectory.target.index not in TARGETS or trajectory.target.subindex:
@@ -34,7 +34,7 @@ def require_fits(trajectory: Trajectory) -> None:
 
 
 def longest_step(trajectory: Trajectory) -> int:
-    """The largest change between two values [raw units of the target]; 0 of a single one."""
+    """Return the largest change between two values [raw units of the target]; 0 for one value."""
     return int(np.max(np.abs(np.diff(trajectory.values)), initial=0))
 
 
@@ -54,10 +54,10 @@ def _check_type(address: Address, values: npt.NDArray[np.int64]) -> None:
 
 
 def require_within_envelope(trajectory: Trajectory) -> None:
-    """What can be known before anything moves: positions inside the travel, torques inside.
+    """Check before any motion that the position, velocity or torque values are in the envelope.
 
     Raises:
-        OutOfRange: a value is beyond the envelope, or there is none.
+        OutOfRange: a value is outside the envelope, or there are no values.
     """
     kind = TARGETS[trajectory.target.index or 0]
     values, limits = trajectory.values, trajectory.envelope

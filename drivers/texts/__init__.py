@@ -1,1 +1,1 @@
-"""Words for people: a code and its facts here, its English and Chinese in `texts/catalogue`."""
+"""Messages for people: code and facts here, English and Chinese in `texts/catalogue`."""

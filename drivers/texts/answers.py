@@ -1,9 +1,9 @@
-"""Answers of tools as plain values: each sentence next to its message, in any language.
+"""Answers of tools as plain values: each sentence together with its message.
 
-A message is a code and facts under ``<name>_message``, several are a list under
-``<name>_messages`` (a map where the sentences are one); their sentences stand under ``<name>``
-(``<name>s`` of a list, where that is the plural) for programs that read sentences. Files of older
-versions have the sentences alone.
+A message is a code with facts under ``<name>_message``; several are a list under
+``<name>_messages`` (a map if the sentences are a map). Their sentences are under ``<name>``
+(``<name>s`` for a list whose plural is formed that way), for programs that read sentences. Files of
+older versions contain only the sentences.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ _ONE, _SEVERAL = "_message", "_messages"
 
 
 def sentences(name: str, messages: Iterable[Text], stem: str | None = None) -> dict[str, object]:
-    """A list of messages for an answer, with its sentences in English.
+    """Return the entries of an answer for a list of messages, with English sentences.
 
-    ``stem`` is the name without its plural's s, where the messages are named by that.
+    ``stem`` is the name without the plural's s, if the messages are named by it.
     """
     listed = list(messages)
     return {
@@ -28,7 +28,7 @@ def sentences(name: str, messages: Iterable[Text], stem: str | None = None) -> d
 
 
 def sentence(name: str, message: Text | None) -> dict[str, object]:
-    """A message for an answer, with its sentence in English, empty where there is none."""
+    """Return the entries of an answer for a message, with its English sentence or ""."""
     return {
         name: "" if message is None else message.words(),
         f"{name}{_ONE}": None if message is None else message.to_wire(),
@@ -36,7 +36,7 @@ def sentence(name: str, message: Text | None) -> dict[str, object]:
 
 
 def message_in(answer: Mapping[str, object], name: str) -> Text | None:
-    """What `sentence` put under this name; the words alone where an older version wrote them."""
+    """Return the message that `sentence` stored; the plain sentence from an older version."""
     wire, words = answer.get(f"{name}{_ONE}"), answer.get(name)
     if isinstance(wire, Mapping) and "code" in wire and "params" in wire:
         return Text.from_wire(wire)
@@ -44,7 +44,7 @@ def message_in(answer: Mapping[str, object], name: str) -> Text | None:
 
 
 def in_language(answer: Mapping[str, object], language: Language) -> dict[str, object]:
-    """The same answer with its sentences in a language; what has no message stays as it is."""
+    """Return the answer with its sentences in a language; values without a message are kept."""
     shown = {name: _in_language(value, language) for name, value in answer.items()}
     for name, value in answer.items():
         if name.endswith(_SEVERAL) and isinstance(value, (list, tuple)):

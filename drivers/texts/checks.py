@@ -1,4 +1,4 @@
-"""What the check of a profile finds, as messages of the catalogue."""
+"""Findings of the check of a profile, as messages of the catalogue."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from profiles.check import Finding
 
 
 def check_line(finding: Finding) -> Text:
-    """A finding with the place that it is about."""
+    """Return a finding with the place that it concerns."""
     message = Text(finding.code, finding.params)
     return text("profile-check.line", place=finding.key, finding=message)

@@ -1,4 +1,4 @@
-"""What an import of a description file reports, as messages of the catalogue."""
+"""Reports of the import of a description file, as messages of the catalogue."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from profiles.importer.report import Fact, Finding, ImportFailed, Outcome
 
 
 def message_of_import(message: Mapping[str, object]) -> Text:
-    """The message that the process of an import wrote as ``code`` and ``params``."""
+    """Return the message that the import process wrote as ``code`` and ``params``."""
     return Text(str(message["code"]), cast(Mapping[str, Fact], message["params"]))
 
 
 def failure_text(error: ImportFailed) -> Text:
-    """Why nothing usable is in a file."""
+    """Return why a file contains nothing usable."""
     return Text(error.code, error.params)
 
 
 def finding_text(finding: Finding) -> Text:
-    """An oddity of a file, without its place."""
+    """Return an irregularity of a file, without its place."""
     return Text(finding.code, finding.params)
 
 
 def finding_line(finding: Finding) -> Text:
-    """An oddity of a file with its place and what was made of it."""
+    """Return an irregularity of a file with its place and how it was handled."""
     place, found = finding.place, finding_text(finding)
     match finding.outcome:
         case "repaired":
@@ -38,7 +38,7 @@ def finding_line(finding: Finding) -> Text:
 
 
 def summary_text(outcomes: Iterable[Outcome], not_listed: int) -> Text:
-    """How many oddities there are, for a heading. ``not_listed`` are those beyond ``outcomes``."""
+    """Return the number of irregularities for a heading, ``not_listed`` beyond ``outcomes``."""
     counts = Counter(outcomes)
     parts: list[Text | str] = []
     if count := counts["repaired"]:

@@ -1,7 +1,7 @@
-"""A message before it has a language: a code of the catalogue and the facts that go into it.
+"""A message independent of language: a code of the catalogue and its facts.
 
-Messages travel as they are, between modules, processes and over the API. Words are made at the
-edge, by `Text.words`, in the language of whoever reads them.
+Messages are passed unchanged between modules, processes and over the API. Words are generated at
+the edge, by `Text.words`, in the language of the reader.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from enum import Enum
 from typing import Literal, TypeAlias, Union
 
 Language = Literal["en", "zh"]
-#: What a parameter may be; `None` where a value is not known.
+#: Types of a parameter; `None` for an unknown value.
 Param: TypeAlias = Union[str, int, float, Enum, "Text", None]
 #: A message as plain values: for JSON, and for other processes.
 Wire: TypeAlias = dict[str, object]
 
 _CODE = re.compile(r"[a-z][a-z0-9-]*(\.[a-z0-9][a-z0-9-]*)+(/remedy)?")
-#: Codes of messages that the catalogue does not have.
+#: Codes of messages that are not in the catalogue.
 PROSE, JOINED = "", "+"
-#: Behind a code: what to do about it, an attribute of the code's entry.
+#: Suffix of a code: its remedy, an attribute of the code's entry.
 REMEDY = "/remedy"
 
-#: The language of whoever is being answered: set for each request, and for a whole command.
+#: The language of the present reader: set for each request, and for a whole command.
 _language: ContextVar[Language] = ContextVar("language", default="en")
 
 
 def language() -> Language:
-    """The language of whoever is being answered here; English where nobody chose another."""
+    """Return the language of the present reader; English if none was chosen."""
     return _language.get()
 
 
 @contextmanager
 def speaking(chosen: Language) -> Iterator[None]:
-    """Answer in this language inside the block."""
+    """Use this language inside the block."""
     token = _language.set(chosen)
     try:
         yield
@@ -46,12 +46,12 @@ def speaking(chosen: Language) -> Iterator[None]:
 
 
 def speak(chosen: Language) -> None:
-    """Answer in this language from here on, as a command does."""
+    """Use this language from now on, for a whole command."""
     _language.set(chosen)
 
 
 def language_of(tag: str | None) -> Language:
-    """The language of a locale or an ``Accept-Language`` header: the first one that there is."""
+    """Return the first available language in a locale or an ``Accept-Language`` header."""
     for part in (tag or "").replace(";", ",").split(","):
         name = part.strip().lower()
         if name.startswith("zh"):
@@ -61,8 +61,8 @@ def language_of(tag: str | None) -> Language:
     return "en"
 
 
-#: Codes of files that earlier versions wrote, by what the same message is called now. The page has
-#: the same list (`webui/src/i18n/message.ts`).
+#: Present names of codes in files of earlier versions. The page has the same list
+#: (`webui/src/i18n/message.ts`).
 RENAMED = {
     "autotune.no-candidate-kept-promise": "autotune.no-candidate-verified",
     "autotune.promise-not-kept": "autotune.prediction-not-confirmed",
@@ -73,7 +73,7 @@ RENAMED = {
 
 @dataclass(frozen=True)
 class Text:
-    """A message of the catalogue, or (``code`` empty) words that came from elsewhere as they are.
+    """A message of the catalogue, or (``code`` empty) unchanged words from another source.
 
     ``code`` is dotted: the room, then what happened, such as ``ethercat.cycle.out-of-range``.
     ``params`` are the facts of the message by name, with their unit in the name.
@@ -83,13 +83,13 @@ class Text:
     params: Mapping[str, Param] = field(default_factory=dict)
 
     def words(self, language: Language = "en") -> str:
-        """The sentence in one language."""
-        from drivers.texts.render import render  # the catalogue's library is needed for words alone
+        """Return the sentence in one language."""
+        from drivers.texts.render import render  # the catalogue's library is needed only for words
 
         return render(self, language)
 
     def remedy(self) -> Text | None:
-        """What the catalogue says to do about it; None where it says nothing."""
+        """Return the remedy in the catalogue; None if there is none."""
         from drivers.texts.render import has_text
 
         part = f"{self.code}{REMEDY}"
@@ -99,15 +99,15 @@ class Text:
         return self.words()
 
     def to_wire(self) -> Wire:
-        """As plain values; a parameter that is a message itself is a map with its code."""
+        """Return plain values; a parameter that is itself a message becomes a map with its code."""
         return {"code": self.code, "params": {k: plain(v) for k, v in self.params.items()}}
 
     @classmethod
     def from_wire(cls, wire: Mapping[str, object]) -> Text:
-        """The same message again.
+        """Restore the message from a map made by `to_wire`.
 
         Raises:
-            KeyError, TypeError: the map is none that `to_wire` made.
+            KeyError, TypeError: the map was not made by `to_wire`.
         """
         params = wire["params"]
         if not isinstance(params, Mapping):
@@ -118,7 +118,7 @@ class Text:
 
 
 def text(code: str, /, **params: Param) -> Text:
-    """A message of the catalogue."""
+    """Return a message of the catalogue."""
     return Text(code, params)
 
 
@@ -134,18 +134,18 @@ class Unsuitable(ValueError):
 
 
 def prose(words: str) -> Text:
-    """Words that others made, such as a drive, an operating system or a person."""
+    """Return text from another source, such as a drive, an operating system or a person."""
     return Text(PROSE, {"words": words})
 
 
 def joined(parts: Iterable[Text | str], joint: str = "; ") -> Text:
-    """Several messages after one another."""
+    """Join several messages."""
     named: dict[str, Param] = {f"part{n}": as_text(part) for n, part in enumerate(parts)}
     return Text(JOINED, {"joint": joint, **named})
 
 
 def parts_of(message: Text | None) -> list[Text]:
-    """The messages that were `joined`; the message itself where it is one; none of None."""
+    """Return the messages that were `joined`; a single message as a list; empty for None."""
     if message is None:
         return []
     if message.code != JOINED:
@@ -154,24 +154,24 @@ def parts_of(message: Text | None) -> list[Text]:
 
 
 def is_code(words: str) -> bool:
-    """Whether this is the form of a code rather than a sentence."""
+    """Return whether a string has the form of a code rather than of a sentence."""
     return _CODE.fullmatch(words) is not None
 
 
 def as_text(words: str | Text, params: Mapping[str, Param] | None = None) -> Text:
-    """A code becomes its message; a sentence stays as it is."""
+    """Convert a code to its message; a sentence remains unchanged."""
     if isinstance(words, Text):
         return words
     return Text(words, params or {}) if is_code(words) else prose(words)
 
 
 def reason_of(error: Exception) -> Text:
-    """Why something failed: the message that the error carries, else the words of a library."""
+    """Return why something failed: the error's message, else the text of a library."""
     return error.why if isinstance(error, Unsuitable) else prose(str(error))
 
 
 def plain(value: Param) -> object:
-    """A parameter as a value of JSON."""
+    """Convert a parameter to a JSON value."""
     if isinstance(value, Text):
         return value.to_wire()
     if isinstance(value, Enum):

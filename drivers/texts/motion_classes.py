@@ -1,4 +1,4 @@
-"""Why a person cannot give an object a motion class, as messages of the catalogue."""
+"""Why a person cannot set the motion class of an object, as messages of the catalogue."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from profiles.schema import Parameter, Profile
 
 
 def fixed_text(profile: Profile, parameter: Parameter) -> Text | None:
-    """Why a person cannot change the class of this object; None where it is possible."""
+    """Return why a person cannot change the class of this object; None if it is possible."""
     why = why_fixed(profile, parameter)
     return None if why is None else Text(why)
 
 
 def refusal_text(error: CannotClassify) -> Text:
-    """Why the class of an object was not changed, with the object."""
+    """Return why the class of an object was not changed, with the object."""
     if "name" not in error.params:
         return Text(error.code, error.params)
     return text("motion.class-fixed", **error.params, why=Text(error.code))

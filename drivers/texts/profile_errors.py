@@ -11,5 +11,5 @@ if TYPE_CHECKING:
 
 
 def profile_error_text(error: ProfileError) -> Text:
-    """What is wrong with a profile's file, and where; what libraries say of it is a fact."""
+    """Return the error in a profile's file and its place; text from libraries is a fact."""
     return Text(error.code, error.params)

@@ -1,7 +1,7 @@
-"""Words of a message from the catalogue (Fluent), one file for each room and language.
+"""Rendering of messages from the catalogue (Fluent), one file for each room and language.
 
 The files of a room are read when its first message is shown. Numbers are written without grouping
-of digits; ``NUM($x, format: ".1f")`` writes one as Python's format does, ``QUOTED($x)`` a name in
+of digits; ``NUM($x, format: ".1f")`` formats a number as in Python, ``QUOTED($x)`` puts a name in
 quotes. The page renders the same files with the same functions (`webui/src/i18n/message.ts`).
 """
 
@@ -24,7 +24,7 @@ _LOCALES: dict[Language, str] = {"en": "en", "zh": "zh-Hans"}
 
 
 class _Real(FluentType):
-    """A number with a point, written as Python writes it."""
+    """A floating-point number, written as in Python."""
 
     def __init__(self, value: float) -> None:
         self.value = value
@@ -34,36 +34,36 @@ class _Real(FluentType):
 
 
 def _num(value: Any, format: str = "") -> str:  # noqa: A002 - Fluent's name of the option
-    """Format a number; what is no number passes as it is."""
+    """Format a number; other values are returned as text."""
     if isinstance(value, _Real):
         return value.value.__format__(format)
     return int(value).__format__(format) if isinstance(value, int) else str(value)
 
 
 def _quoted(value: Any) -> str:
-    """A name in quotes; a number as it is."""
+    """Put a name in quotes; return a number as it is."""
     return repr(str(value)) if isinstance(value, str) else _num(value)
 
 
-#: The library's type is narrower than what it calls: functions have options, and may return text.
+#: The library's type is narrower than its use: functions have options, and may return text.
 _FUNCTIONS: dict[str, Any] = {"NUM": _num, "QUOTED": _quoted}
 
 
 def identifier(code: str) -> str:
-    """The identifier of a code in the catalogue's files, which have no dots."""
+    """Return the identifier of a code in the catalogue's files, which cannot contain dots."""
     return code.replace(".", "_")
 
 
 @cache
 def files() -> dict[str, Path]:
-    """By room the path of its texts without language and ending."""
+    """Map each room to the path of its texts without language and extension."""
     found = sorted(CATALOGUE.rglob("*.en.ftl"))
     return {each.name.removesuffix(".en.ftl"): each.with_name(each.name[:-7]) for each in found}
 
 
 @cache
 def bundle(room: str, language: Language) -> FluentBundle | None:
-    """All texts of one room in one language; None where the catalogue has no such room."""
+    """Return all texts of one room in one language; None if the catalogue has no such room."""
     place = files().get(room)
     if place is None:
         return None
@@ -75,7 +75,7 @@ def bundle(room: str, language: Language) -> FluentBundle | None:
 
 
 def render(message: Text, language: Language) -> str:
-    """The sentence; a code that the catalogue lacks is shown with its facts."""
+    """Return the sentence; a code missing in the catalogue is shown with its facts."""
     if message.code == PROSE:
         return _as_words(message.params.get("words"), language)
     if message.code == JOINED:
@@ -86,7 +86,7 @@ def render(message: Text, language: Language) -> str:
 
 
 def has_text(code: str) -> bool:
-    """Whether the catalogue has words for this code, or this part of one."""
+    """Return whether the catalogue has a text for this code, or this attribute of a code."""
     return _found(code, "en") is not None
 
 
@@ -104,7 +104,7 @@ def _found(code: str, language: Language) -> tuple[FluentBundle, Pattern] | None
 
 
 def _pattern(message: Text, language: Language) -> str | None:
-    # Words in another language are better than none.
+    # Text in another language is better than none.
     found = _found(message.code, language) or _found(message.code, "en")
     if found is None:
         return None
@@ -117,7 +117,7 @@ def _pattern(message: Text, language: Language) -> str | None:
 def _argument(value: Param, language: Language) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
-    # numpy's numbers are registered as such, but are neither int nor float.
+    # numpy's numbers are registered as these types, but are neither int nor float.
     number: object = value
     if isinstance(number, Enum):
         return _as_words(value, language)

@@ -1,4 +1,4 @@
-"""Which virtual drives there are and which wires they hang on, as read from a bench file.
+"""The virtual drives of a bench file and the wires to which they are connected.
 
 ::
 
@@ -7,10 +7,10 @@
     drive = "mms7"
     on = "mlink://virtual0"
     station = 1
-    also_on = "modbus://virtual0"      # a second port of the same drive, where it has one
+    also_on = "modbus://virtual0"      # a second port of the same drive, if it has one
     also_station = 1
     connected = true                   # the demo connects it at its start
-    moves = {kind = "screw", lead_mm = 10}    # what the page shows it to move
+    moves = {kind = "screw", lead_mm = 10}    # mechanics that the page shows
     defects = ["coupling_loose"]       # of drivers.virtual.defects
     [axis.mechanics.motor]
     …
@@ -50,7 +50,7 @@ from drivers.virtual.mechanics.spec import MechanicsSpec, standard_mechanics
 from profiles.loader import ProfileError, load_profile
 
 #: Highest station of each bus: MODBUS over Serial Line V1.02 clause 2.2, CiA 301 clause 7.2.1, and
-#: the places of an EtherCAT segment (16-bit addresses).
+#: the positions of an EtherCAT segment (16-bit addresses).
 _LAST_STATION = {"mlink": 247, "modbus": 247, "canopen": 127, "ethercat": 65535}
 STANDARD_BENCH = Path(__file__).with_name("standard_bench.toml")
 
@@ -68,15 +68,15 @@ class AxisSpec(BaseModel):
     also_station: int | None = None
     serial: int | None = Field(default=None, ge=1, le=0xFFFFFFFF)
     connected: bool = False
-    #: What the shaft drives, as `backend.scales.gear_calculator.Mechanics` is written.
+    #: Mechanics driven by the shaft, in the form of `backend.scales.gear_calculator.Mechanics`.
     moves: dict[str, str | int | float] = Field(default_factory=dict)
-    #: As the file has them; `load_bench` plants the defects.
+    #: As in the file; `load_bench` adds the defects.
     mechanics: MechanicsSpec = Field(default_factory=standard_mechanics)
     defects: tuple[Defect, ...] = ()
 
     @property
     def serial_number(self) -> int:
-        """As the bench says, or one of its bus and station: no two drives of a bench share one."""
+        """The bench's serial number, or one derived from bus and station, unique within a bench."""
         if self.serial is not None:
             return self.serial
         return 0x56000000 | (zlib.crc32(self.on.encode()) & 0xFFFF) << 8 | self.station & 0xFF
@@ -100,17 +100,17 @@ class BenchSpec(BaseModel):
     gantry: tuple[GantrySpec, ...] = ()
 
     def urls(self, scheme: str | None = None) -> list[str]:
-        """Bus URLs in the order they appear, of one scheme where given."""
+        """Return bus URLs in order of appearance, optionally of one scheme."""
         seen = dict.fromkeys(url for axis in self.axis for url, _ in axis.ports)
         return [url for url in seen if scheme is None or parse_url(url).scheme == scheme]
 
     def on(self, url: str) -> list[tuple[AxisSpec, int]]:
-        """Drives on a bus with their stations there."""
+        """Return the drives on a bus with their stations there."""
         return [(axis, s) for axis in self.axis for u, s in axis.ports if u == url]
 
 
 def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
-    """Read a bench file (TOML, or JSON of the same shape); mechanics paths are next to it.
+    """Read a bench file (TOML, or JSON of the same form); mechanics paths are relative to it.
 
     Raises:
         NotAllowed: the file is missing or wrong; the message names the field.
@@ -145,7 +145,7 @@ def write_bench(path: Path, defects: Sequence[str], target: Path) -> None:
     """Write a bench as JSON with further defects, each as ``AXIS=DEFECT``.
 
     Raises:
-        NotAllowed: the file is missing or wrong, no axis has this name, or it is no defect.
+        NotAllowed: the file is missing or wrong, no axis has this name, or the defect is unknown.
     """
     load_bench(path)
     content = _content(path)
@@ -165,7 +165,7 @@ def write_bench(path: Path, defects: Sequence[str], target: Path) -> None:
 
 
 def _content(path: Path) -> dict[str, Any]:
-    """What a bench file says, with the mechanics of files next to it."""
+    """Return the content of a bench file, with the mechanics of files next to it."""
     text = path.read_text("utf-8")
     content: dict[str, Any] = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
     for axis in content.get("axis", []):
@@ -176,7 +176,7 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _with_defects(bench: BenchSpec, path: Path) -> BenchSpec:
-    """The bench with the defects of its axes in their mechanics and beams."""
+    """Return the bench with the defects of its axes in their mechanics and beams."""
     axes, beams = [], list(bench.gantry)
     for axis in bench.axis:
         mechanics = axis.mechanics
@@ -216,7 +216,7 @@ def _check_names(bench: BenchSpec, path: Path) -> None:
 
 
 def _check_gantry(gantry: GantrySpec, bench: BenchSpec, path: Path) -> None:
-    """Both axes are there, on one EtherCAT segment, with nothing on their shafts but the beam."""
+    """Check that both axes are on one EtherCAT segment, with only the beam on their shafts."""
     names = " + ".join(gantry.axes)
     axes = [axis for axis in bench.axis if axis.name in gantry.axes]
     beams = [name for each in bench.gantry for name in each.axes]
@@ -234,7 +234,7 @@ def _check_gantry(gantry: GantrySpec, bench: BenchSpec, path: Path) -> None:
 
 
 def _check_ports(axis: AxisSpec, path: Path) -> None:
-    """Every port is one that the family has, under a number that its bus has."""
+    """Check that the family has every port, with a station number that the bus allows."""
     try:
         profile = load_profile(axis.drive)
     except ProfileError as error:

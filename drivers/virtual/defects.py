@@ -1,4 +1,4 @@
-"""Defects of a machine that are planted in a virtual axis, as the tools are to find them."""
+"""Defects of a machine in a virtual axis, for the tools to find."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ Defect = Literal[
     "out_of_square",
 ]
 DEFECTS: Final = get_args(Defect)
-#: Of the stiffness that the coupling had.
+#: Share of the coupling's original stiffness.
 LOOSE = 0.7
-#: Of the friction that the belt had, and the backlash that it has then.
+#: Factor of the belt's friction, and its backlash [rad].
 WORN, WORN_BACKLASH_RAD = 1.2, 0.004
-#: Of the rated torque of the motor: a good brake holds twice that.
+#: Holding torque as a share of the motor's rated torque: a good brake holds twice the rated torque.
 SLIPS = 0.6
-#: Rad of the motors between both sides of a gantry, first less second.
+#: Angle between the motors of both sides of a gantry, first less second [rad].
 OUT_OF_SQUARE_RAD = 0.12
-#: These act on what hangs at the motor.
+#: Defects of the load at the motor.
 OF_LOAD: Final = ("coupling_loose", "belt_worn")
-#: These act on the beam between two axes, see `drivers.virtual.mechanics.gantry`.
+#: Defects of the beam between two axes, see `drivers.virtual.mechanics.gantry`.
 OF_GANTRY: Final = ("out_of_square",)
 DEFECT_WORDS: Final[dict[Defect, Text]] = {
     "phases_shifted": text("virtual.defect-phases-shifted"),
@@ -44,9 +44,9 @@ DEFECT_WORDS: Final[dict[Defect, Text]] = {
 
 
 def planted(spec: MechanicsSpec, defect: Defect) -> MechanicsSpec:
-    """The same axis with a defect of its own; one of `OF_GANTRY` leaves it as it is.
+    """Return the same axis with a defect of its own; those `OF_GANTRY` leave it unchanged.
 
-    Those `OF_LOAD` need an axis with a load.
+    Those `OF_LOAD` require an axis with a load.
     """
     change = _CHANGES.get(defect)
     return spec if change is None else change(spec)
@@ -64,7 +64,7 @@ def _loose(spec: MechanicsSpec) -> MechanicsSpec:
 
 
 def _worn(spec: MechanicsSpec) -> MechanicsSpec:
-    """Friction of all kinds but the fan's, and backlash at the last inertia."""
+    """Increase all friction except the fan's, and add backlash at the last inertia."""
     names = ("viscous_nms", "coulomb_nm", "static_nm", "load_coulomb_nm")
     rubbing = {name: WORN * getattr(spec.friction, name) for name in names}
     *others, last = spec.load

@@ -1,4 +1,4 @@
-"""The seam between a virtual drive's firmware and the wire it hangs on."""
+"""The interface between a virtual drive's firmware and its wire."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ABORT_NO_DATA = 0x08000024
 
 @dataclass(frozen=True, slots=True)
 class EntryInfo:
-    """What the SDO information service says of an entry (ETG.1000.6 clause 5.6.3)."""
+    """Description of an entry in the SDO information service (ETG.1000.6 clause 5.6.3)."""
 
     name: str
     type: DataType
@@ -56,90 +56,90 @@ class ProcessImage(Protocol):
     """Process data of one direction, bound to a mapping."""
 
     size: int
-    """Bytes."""
+    """Size in bytes."""
 
     def pack(self) -> bytes:
-        """Current values of the mapped objects (inputs, drive to master)."""
+        """Return the values of the mapped objects (inputs, drive to master)."""
 
     def unpack(self, data: bytes) -> None:
-        """Take over the outputs of the master; values out of range are limited as in a drive."""
+        """Apply the outputs of the master; values out of range are limited as in a drive."""
 
 
 class Device(Protocol):
-    """A virtual drive as its wire sees it. Not thread-safe: one wire thread calls it.
+    """A virtual drive as its wire accesses it. Not thread-safe: one wire thread calls it.
 
-    Times are nanoseconds on the wire's clock, which may be real or simulated. ``advance`` is
-    called before every access; physics and firmware are computed lazily up to that time.
+    Times are nanoseconds on the wire's clock, which may be real or simulated. ``advance`` is called
+    before every access; physics and firmware are computed lazily up to that time.
     """
 
     profile: Profile
     powered: bool
 
     def advance(self, t_ns: int) -> None:
-        """Bring physics and firmware to ``t_ns``; earlier times do nothing."""
+        """Advance physics and firmware to ``t_ns``; earlier times have no effect."""
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an object, little endian. Raises SdoAbort."""
+        """Return the value of an object, little endian. Raises SdoAbort."""
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
         """Write an object. Raises SdoAbort with nothing changed."""
 
     def read_register(self, register: int, count: int) -> list[int]:
-        """Modbus registers of a family with a register table. Raises SdoAbort."""
+        """Return Modbus registers of a family with a register table. Raises SdoAbort."""
 
     def write_registers(self, register: int, values: Sequence[int]) -> None:
         """Write Modbus registers of a family with a register table. Raises SdoAbort."""
 
     def indices(self) -> Sequence[int]:
-        """All object indices, ascending."""
+        """Return all object indices, ascending."""
 
     def subindices(self, index: int) -> Sequence[int]:
-        """All subindices of an object, ascending. Raises SdoAbort."""
+        """Return all subindices of an object, ascending. Raises SdoAbort."""
 
     def entry(self, index: int, subindex: int) -> EntryInfo:
-        """Description of an entry. Raises SdoAbort."""
+        """Return the description of an entry. Raises SdoAbort."""
 
     def map_process_data(self, entries: Sequence[int], direction: str) -> ProcessImage:
         """Bind mapping entries (32-bit: index << 16 | subindex << 8 | bits) for "rx" or "tx".
 
-        Raises SdoAbort for what cannot be mapped.
+        Raises SdoAbort for entries that cannot be mapped.
         """
 
     def communication_lost(self, reason: str) -> None:
-        """The wire's watchdog fired or the network state fell: react as the family does."""
+        """React as the family does when the wire's watchdog expired or the network state fell."""
 
     def take_emergencies(self) -> list[tuple[int, int, bytes]]:
-        """Emergencies since the last call: (error code, error register, 5 manufacturer bytes)."""
+        """Return emergencies since the last call: (error code, error register, 5 bytes)."""
 
     def power_cycle(self, off_s: float = 0.0) -> None:
-        """Switch off (for a time) and on again: volatile values go, NVM stays."""
+        """Switch off (for a time) and on again: volatile values are lost, NVM is kept."""
 
     def inject(self, what: str, value: float = 1.0) -> None:
-        """Cause trouble by name, such as a fault's code or ``encoder_loss``."""
+        """Cause a failure by name, such as a fault's code or ``encoder_loss``."""
 
 
 @runtime_checkable
 class StartsWithNetwork(Protocol):
-    """A device that takes over some parameters when its network comes up."""
+    """A device that applies some parameters when its network starts."""
 
     def network_started(self) -> None:
-        """The EtherCAT state machine went from Init to Pre-Operational."""
+        """Handle the transition of the EtherCAT state machine from Init to Pre-Operational."""
 
 
 @runtime_checkable
 class HasShaft(Protocol):
-    """A device with a motor, whose shaft can be looked at past every object and unit."""
+    """A device with a motor, whose true shaft angle is available independently of any object."""
 
     @property
     def shaft_rev(self) -> float:
-        """Angle of the motor's shaft in revolutions, as physics has it."""
+        """True angle of the motor's shaft in revolutions."""
 
 
 def shaft_rev(device: Device) -> float:
-    """Angle of this device's shaft.
+    """Return the true shaft angle of this device in revolutions.
 
     Raises:
-        ValueError: it has none.
+        ValueError: it has no shaft.
     """
     if not isinstance(device, HasShaft):
         raise ValueError("this device has no shaft")  # noqa: TRY004 - of a command by name

@@ -4,10 +4,10 @@
 
     python -m drivers.virtual.host --bench FILE --folder DIR [--nvm DIR]
 
-It makes the wires under ``DIR``, prints one JSON line ``{"ready": true, "wires": {URL: URL}}``
-(the bench's URL to the real one), then takes one JSON command per line and answers each:
-``pull``, ``heal`` (a wire), ``power_cycle``, ``inject`` (an axis), ``mute``, ``stop``. It ends
-when its standard input closes, so it never outlives whoever started it.
+It creates the wires under ``DIR``, prints one JSON line ``{"ready": true, "wires": {URL: URL}}``
+(the bench's URL to the real one), then reads one JSON command per line and answers each: ``pull``,
+``heal`` (a wire), ``power_cycle``, ``inject`` (an axis), ``mute``, ``stop``. It ends when its
+standard input closes, so it never outlives its parent.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ from profiles.loader import ProfileError
 
 
 class Cable(Protocol):
-    """Something that can be pulled and plugged in again."""
+    """Something that can be unplugged and plugged in again."""
 
     def pull(self) -> None:
-        """Pull it."""
+        """Unplug it."""
 
     def heal(self) -> None:
         """Plug it in again."""
@@ -76,10 +76,10 @@ class Wires:
         self._nvm = nvm
 
     def start(self) -> None:
-        """Make the devices and their wires.
+        """Create the devices and their wires.
 
         Raises:
-            DriveError: a wire cannot be made.
+            DriveError: a wire cannot be created.
         """
         for scheme in ("mlink", "modbus"):
             for number, url in enumerate(self._bench.urls(scheme)):
@@ -88,7 +88,7 @@ class Wires:
             self._start_can(url, number)
 
     def stop(self) -> None:
-        """Take all wires down."""
+        """Stop all wires."""
         for slave in self._slaves.values():
             slave.stop()
         for wire, _ in self._can_wires.values():
@@ -104,7 +104,7 @@ class Wires:
             real = make_device(axis.drive, axis.mechanics, nvm, station)
             number_device(real, axis.serial_number)
             device = SharedDevice(real, self._lock)
-            # Compiles the physics on a machine's first start, before anybody asks the drive.
+            # Compiles the physics on a machine's first start, before the drive is accessed.
             now_ns = time.monotonic_ns()
             device.advance(now_ns)
             device.advance(now_ns + 10_000_000)
@@ -128,7 +128,7 @@ class Wires:
         slave = ModbusSlave(PtyWire(path, wire_time), stations, lock=self._lock)
         slave.start()
         self._slaves[url] = slave
-        # A pty refuses parity (EINVAL), so the address that is handed out asks for none.
+        # A pty refuses parity (EINVAL), so the URL passed on requests none.
         self.real_urls[url] = f"{scheme}://{path}?parity=N"
 
     def _start_can(self, url: str, number: int) -> None:
@@ -148,10 +148,10 @@ class Wires:
         self._can_wires[url] = (wire, side)
         self.real_urls[url] = f"canopen://slcan/{path}?bitrate={bitrate}"
 
-    # --- trouble ----------------------------------------------------------------------
+    # --- failures ---------------------------------------------------------------------
 
     def carry_out(self, command: dict[str, object]) -> object:
-        """One command of the control channel.
+        """Execute one command of the control channel.
 
         Raises:
             ValueError: no such command, wire or axis.
@@ -188,7 +188,7 @@ class Wires:
         return device
 
     def _mute(self, command: dict[str, object]) -> None:
-        """All drives of a wire, or the one at ``station``."""
+        """Mute all drives of a wire, or the one at ``station``."""
         on, station = bool(command.get("on", True)), command.get("station")
         can_wire = self._can_wires.get(str(command.get("wire")))
         if can_wire is not None:
@@ -205,7 +205,7 @@ class Wires:
             slave.mute_stations.discard(int(str(station)))
 
     def _swap(self, command: dict[str, object]) -> None:
-        """Two drives change places on their wire."""
+        """Exchange two drives on their wire."""
         slave = self._slave(command)
         first, second = int(str(command["first"])), int(str(command["second"]))
         with self._lock:
@@ -222,7 +222,7 @@ class Wires:
             self._axis(command).inject(str(command.get("what")), value)
 
     def _read(self, command: dict[str, object]) -> str:
-        """The drive's own value as it is now, past the wire."""
+        """Return the drive's own present value, bypassing the wire."""
         with self._lock:
             index, subindex = int(str(command["index"])), int(str(command["subindex"]))
             device = self._axis(command)
@@ -230,7 +230,7 @@ class Wires:
             return device.read(index, subindex).hex()
 
     def _shaft(self, command: dict[str, object]) -> float:
-        """The shaft's angle in revolutions, past every wire and unit."""
+        """Return the shaft's angle in revolutions, independent of wires and units."""
         with self._lock:
             device = self._axis(command)
             device.advance(time.monotonic_ns())

@@ -1,4 +1,4 @@
-"""One virtual drive on two wires: each wire's thread takes the drive's lock for every call."""
+"""One virtual drive on two wires: each wire's thread holds the drive's lock during every call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Profiles from makers' description files (ESI, EDS, DCF) or from a drive's own dictionary."""
+"""Profiles from manufacturers' description files (ESI, EDS, DCF) or a drive's own dictionary."""
 
 from profiles.importer.build import ImportedProfile, build_profile
 from profiles.importer.dcf import (

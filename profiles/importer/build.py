@@ -1,4 +1,4 @@
-"""A description merged over the generic CiA 402 profile."""
+"""Merging of a description with the generic CiA 402 profile."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from profiles.schema import (
     Watchdog,
 )
 
-#: Objects of the axes of a device, each 800h behind the one before (CiA 402-1).
+#: Objects of the axes of a device, each 800h after those of the axis before (CiA 402-1).
 _AXES = range(0x6000, 0xA000)
 _AXIS_STEP = 0x800
 
-#: Objects of CiA 402 without which a drive is none.
+#: Objects of CiA 402 that every drive has.
 _NEEDED = ("6040:00", "6041:00")
 
 #: Objects that show that a mode exists (CiA 402-2 clause 8.5).
@@ -53,12 +53,12 @@ _SAME_WIDTH: dict[DataType, DataType] = {
 
 @dataclass(frozen=True, slots=True)
 class ImportedProfile:
-    """The profile and what was odd about its source."""
+    """The profile and the irregularities of its source."""
 
     profile: Profile
     report: ImportReport
     others: tuple[EsiDevice, ...] = ()
-    """Further devices of the file, which could have been taken instead."""
+    """Further devices of the file, which could have been chosen instead."""
 
 
 def build_profile(
@@ -70,11 +70,11 @@ def build_profile(
 ) -> ImportedProfile:
     """Merge ``description`` over the generic profile.
 
-    What the file says of an object counts; the generic profile adds units, bit and value names,
-    roles, homing methods and procedures for the standard objects that the drive has.
+    The file's data on an object take precedence; the generic profile adds units, bit and value
+    names, roles, homing methods and procedures for the standard objects that the drive has.
 
     Raises:
-        ImportFailed: nothing in it has a known type.
+        ImportFailed: none of its objects has a known type.
     """
     base = generic or load_profile(STANDARD)
     parameters: dict[str, Parameter] = {}
@@ -130,7 +130,7 @@ def build_profile(
 
 
 def _note_further_axes(description: Description, report: ImportReport) -> None:
-    """Axes behind the first, whose objects lie 800h behind each other (CiA 402-1).
+    """Note axes after the first, whose objects are 800h apart (CiA 402-1).
 
     Without a control word they are process data of the modules of an I/O device (ETG.5001).
     """
@@ -141,7 +141,7 @@ def _note_further_axes(description: Description, report: ImportReport) -> None:
 
 
 def _standard(base: Profile, entry: DescribedEntry) -> Parameter | None:
-    """The standard's object of this key; of a further axis that of the first one."""
+    """Return the standard's object of this key; for a further axis that of the first one."""
     if entry.index in _AXES:
         first = _AXES.start + (entry.index - _AXES.start) % _AXIS_STEP
         return base.by_key.get(f"{first:04X}:{entry.subindex:02X}")
@@ -149,7 +149,7 @@ def _standard(base: Profile, entry: DescribedEntry) -> Parameter | None:
 
 
 def slug(name: str) -> str:
-    """A drive name that a profile may have."""
+    """Return a drive name that a profile may have."""
     bare = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     return bare[:60] if re.match(r"[a-z]", bare) else f"drive_{bare[:54]}".rstrip("_")
 
@@ -221,10 +221,11 @@ def _parameter(
 def _rights(
     entry: DescribedEntry, standard: Parameter | None, report: ImportReport
 ) -> tuple[Access, PdoMapping]:
-    """Access and mapping. Files mark read-only objects as outputs, and outputs as read-only.
+    """Return access and mapping. Files mark read-only objects as outputs, and outputs as read-only.
 
-    What the standard only lets read (603Fh, 6041h) stays so; what it lets write and the file
-    maps as an output is writable. Of a maker's object the file's own words count.
+    Objects that are read-only in the standard (603Fh, 6041h) remain so; objects that are writable
+    in it and mapped as an output by the file are writable. For a manufacturer's object the file
+    counts.
     """
     if entry.access != "ro" or entry.pdo not in ("rx", "rxtx") or standard is None:
         return entry.access, entry.pdo
@@ -236,7 +237,7 @@ def _rights(
 
 
 def _uses_sign(entry: DescribedEntry) -> bool:
-    """Whether the file itself gives the object a negative value."""
+    """Return whether the file itself states a negative value for the object."""
     values = (entry.default_raw, entry.min_raw)
     return any(isinstance(value, (int, float)) and value < 0 for value in values)
 
@@ -244,7 +245,7 @@ def _uses_sign(entry: DescribedEntry) -> bool:
 def _within(
     enum: dict[int, str], data_type: DataType, low: float | None, high: float | None
 ) -> dict[int, str]:
-    """Values of the standard's list that this drive's own limits allow."""
+    """Return values of the standard's list that this drive's own limits allow."""
     bounds = INTEGER_RANGE.get(data_type)
     if bounds is None:
         return {}
@@ -261,7 +262,7 @@ def _limits(
         low, high = _resigned(low, data_type), _resigned(high, data_type)
         default = _resigned(default, data_type) if isinstance(default, int) else default
     if low is not None and high is not None and low == high == 0:
-        # Many tools write both as 0 where nobody gave any.
+        # Many tools write 0 for both if no limits were entered.
         report.noted(entry.place, "description.limits-zero", key=entry.key)
         low = high = None
     if low is not None and high is not None and low > high:
@@ -279,7 +280,7 @@ def _limits(
 
 
 def _resigned(value: int | float | None, data_type: DataType) -> int | float | None:
-    """The same bits under the other sign."""
+    """Return the same bits with the other signedness."""
     if not isinstance(value, int):
         return value
     low, high = INTEGER_RANGE[data_type]
@@ -300,7 +301,7 @@ def _group(index: int) -> str:
 
 
 def _modes(parameters: dict[str, Parameter]) -> tuple[int, ...]:
-    """Modes that the drive's 6502h default names, else those whose objects it has."""
+    """Return the modes in the default of 6502h, else those whose objects exist."""
     bits = {1: 0, 3: 2, 4: 3, 6: 5, 7: 6, 8: 7, 9: 8, 10: 9}
     supported = parameters.get("6502:00")
     default = supported.default_raw if supported is not None else None
@@ -380,20 +381,20 @@ def _pdo_spec(
 
 
 def _contents_locked(description: Description) -> bool:
-    """Whether the file says in so many words that mapping objects cannot be written."""
+    """Return whether the file explicitly states that mapping objects cannot be written."""
     rules = description.bring_up
     return rules is not None and rules.coe.pdo_config is False
 
 
 def _sync_modes(description: Description) -> tuple[str, ...]:
-    """As the operation modes of the file say: an AssignActivate means distributed clocks."""
+    """Return the sync modes of the file's operation modes; AssignActivate means DC."""
     modes = description.bring_up.clock_modes if description.bring_up is not None else ()
     kinds = {"DC-synchronous" if mode.assign_activate else "SM-synchronous" for mode in modes}
     return tuple(sorted(kinds))
 
 
 def _default(sets: list[PdoSet], direction: Literal["rx", "tx"]) -> int | None:
-    """The PDO that a sync manager carries as delivered, else the first with contents."""
+    """Return the PDO assigned to a sync manager by default, else the first with contents."""
     own = [s for s in sets if s.direction == direction]
     assigned = [s for s in own if s.sync_manager is not None]
     filled = [s for s in own if s.entries]

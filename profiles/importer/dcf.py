@@ -22,9 +22,9 @@ from profiles.schema import DataType
 
 @dataclass(frozen=True, slots=True)
 class ConfiguredValue:
-    """One ``ParameterValue`` as it is in the file; what is added to the node-ID is the sum.
+    """One ``ParameterValue`` of the file, with the node-ID added where the file refers to it.
 
-    ``type`` is that of the file, None where it gives none.
+    ``type`` is the type stated by the file, None if it states none.
     """
 
     index: int
@@ -35,7 +35,7 @@ class ConfiguredValue:
 
 
 def is_dcf(data: bytes) -> bool:
-    """Whether the bytes look like a DCF or EDS: a list in another format has no such sections."""
+    """Return whether the data look like a DCF or EDS: lists in other formats lack such sections."""
     start = data[:8192].lower()
     if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
         start = start.replace(b"\0", b"")
@@ -43,10 +43,10 @@ def is_dcf(data: bytes) -> bool:
 
 
 def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[ConfiguredValue]:
-    """Values to be configured, in the file's order; EDS defaults are not among them.
+    """Return the values to be configured, in the file's order, without the EDS defaults.
 
     Raises:
-        ImportFailed: too big, or no object of it has a value.
+        ImportFailed: too large, or no object has a value.
     """
     check_size(data, MAX_BYTES, name)
     sections = read_sections(decode_text(data, name, report), name, report)
@@ -61,10 +61,10 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
 
 
 def read_dcf_identity(data: bytes, name: str) -> tuple[int | None, int | None]:
-    """Vendor and product number of the drive that the file was made for, None where not given.
+    """Return vendor and product number of the drive of this file, None where not stated.
 
     Raises:
-        ImportFailed: too big.
+        ImportFailed: too large.
     """
     check_size(data, MAX_BYTES, name)
     quiet = ImportReport()
@@ -73,9 +73,9 @@ def read_dcf_identity(data: bytes, name: str) -> tuple[int | None, int | None]:
 
 
 def _values(sections: dict[str, Section], name: str) -> Iterator[ConfiguredValue]:
-    """Every object that has a ``ParameterValue``.
+    """Iterate over the objects with a ``ParameterValue``.
 
-    Values of arrays in compact storage stand in a section of their own, as ``[607DValue]``.
+    Values of arrays in compact storage are in a section of their own, such as ``[607DValue]``.
     """
     for title, section in sections.items():
         if (match := COMPACT.match(title)) and match[2] == "value":

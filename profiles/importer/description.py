@@ -9,12 +9,12 @@ from profiles.bring_up import BringUp
 from profiles.schema import Access, DataType, LinkKind, PdoIdentifier, PdoMapping, Raw
 
 MAX_ENTRIES = 20_000
-"""More entries than any drive has: a file with more is broken or hostile."""
+"""More entries than any drive has: a larger file is broken or hostile."""
 
 
 @dataclass(frozen=True, slots=True)
 class DescribedEntry:
-    """One object-dictionary entry. ``type`` None: the file does not say or nobody knows it."""
+    """One object-dictionary entry. ``type`` None: not stated in the file, or unknown."""
 
     index: int
     subindex: int
@@ -31,11 +31,11 @@ class DescribedEntry:
     help: str = ""
     source: str = ""
     at: str = ""
-    """Where it is, for findings; empty where ``source`` says so."""
+    """Its place, for findings; empty if ``source`` states it."""
 
     @property
     def place(self) -> str:
-        """Where findings about it are."""
+        """Place for findings about it."""
         return self.at or self.source
 
     @property
@@ -54,12 +54,12 @@ class DescribedPdo:
     fixed: bool
     source: str
     layout: tuple[tuple[str | None, int], ...] = ()
-    """Key (None: padding) and bits of every stretch; empty where entries are whole objects."""
+    """Key (None: padding) and bits of every part; empty if all entries are whole objects."""
     sync_manager: int | None = None
     mandatory: bool = False
     exclude: tuple[int, ...] = ()
     identifier: PdoIdentifier | None = None
-    """CANopen: the COB-ID as delivered."""
+    """CANopen: the default COB-ID."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +81,9 @@ class Description:
     baudrates: tuple[int, ...] = ()
     """Bit rates of a CANopen drive in bit/s."""
     at: str = ""
-    """Name of the file or drive, for findings; empty where ``file`` is it."""
+    """Name of the file or drive, for findings; empty if ``file`` is that name."""
 
     @property
     def place(self) -> str:
-        """Where findings about the whole are."""
+        """Place for findings about the whole."""
         return self.at or self.file

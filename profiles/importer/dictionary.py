@@ -1,4 +1,4 @@
-"""A drive's own dictionary, as its SDO information service enumerates it.
+"""A drive's own dictionary, as enumerated by its SDO information service.
 
 Source: ETG.1000.6 clause 5.6.3 (object access flags), clause 5.6.7.3 (data types).
 """
@@ -19,11 +19,11 @@ from profiles.schema import INTEGER_RANGE, Access, DataType, LinkKind, PdoMappin
 class DictionaryEntry:
     """One entry as enumerated.
 
-    ``type_code`` is the CANopen data type number, ``access`` the 16 access flags: bits 0 to 2
-    read in Pre-Op, Safe-Op, Op; bits 3 to 5 write in the same states; bit 6 mappable as RxPDO,
-    bit 7 as TxPDO. ``object_name`` is the name of the whole object where it has subindices,
-    ``members`` how many subindices it has. ``unit`` is a number of CiA 303-2; values are bytes as
-    they travel. All of these are left out where the drive reports none.
+    ``type_code`` is the CANopen data type number, ``access`` the 16 access flags: bits 0 to 2 read
+    in Pre-Op, Safe-Op, Op; bits 3 to 5 write in the same states; bit 6 mappable as RxPDO, bit 7 as
+    TxPDO. ``object_name`` is the name of the whole object if it has subindices, ``members`` their
+    number. ``unit`` is a number of CiA 303-2; values are bytes as transferred. All of these are
+    left out where the drive reports none.
     """
 
     index: int
@@ -50,10 +50,10 @@ def describe_dictionary(
     revision: int | None = None,
     link: LinkKind = "ethercat",
 ) -> Description:
-    """Describe a drive by what it says of itself.
+    """Describe a drive by its own dictionary.
 
     Raises:
-        ImportFailed: it says nothing.
+        ImportFailed: the dictionary is empty.
     """
     file = f"dictionary of {tidy(name)}"
     found: list[DescribedEntry] = []
@@ -65,9 +65,9 @@ def describe_dictionary(
             continue
         seen.add((entry.index, entry.subindex))
         if not 0x1000 <= entry.index <= 0xFFFF or not 0 <= entry.subindex <= 255:
-            continue  # below are the definitions of types
+            continue  # lower indices define types
         if entry.subindex == 0 and entry.members > 1:
-            continue  # only counts the others
+            continue  # only contains the count
         if len(found) >= MAX_ENTRIES:
             report.left_out(place, "description.too-many-entries", entries=MAX_ENTRIES)
             break
@@ -122,7 +122,7 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
 
 
 def _number(data: bytes, data_type: DataType) -> int | float | None:
-    """A value of this type, or None for text and for another length."""
+    """Return a value of this type, or None for text and for another length."""
     if data_type == "REAL32":
         return float(struct.unpack("<f", data)[0]) if len(data) == 4 else None
     limits = INTEGER_RANGE.get(data_type)

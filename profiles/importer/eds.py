@@ -1,7 +1,8 @@
 """CANopen EDS and DCF files.
 
-Source: CiA 306-1 v1.3. Makers' files deviate in many ways; a reader that refuses them is of no
-use, one that guesses in silence is dangerous. So everything repaired or left out is reported.
+Source: CiA 306-1 v1.3. Manufacturers' files deviate in many ways; a reader that refuses them is
+useless, and one that guesses silently is dangerous. Therefore everything repaired or left out is
+reported.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
     """Read an EDS or DCF file.
 
     Raises:
-        ImportFailed: too big, or no object with a known type in it.
+        ImportFailed: too large, or without an object of a known type.
     """
     check_size(data, MAX_BYTES, name)
     sections = read_sections(decode_text(data, name, report), name, report)
@@ -76,7 +77,7 @@ def read_eds(data: bytes, name: str, report: ImportReport) -> Description:
 def identity_of(
     sections: dict[str, Section], name: str, report: ImportReport
 ) -> tuple[int | None, int | None]:
-    """Vendor and product number of [DeviceInfo]; None where the file gives none."""
+    """Return vendor and product number of [DeviceInfo]; None where the file states none."""
     device = sections.get("deviceinfo", Section(0))
     return (
         _identity(device, "vendornumber", name, report),
@@ -89,7 +90,7 @@ def _identity(device: Section, key: str, name: str, report: ImportReport) -> int
     return None if number is None else _real_identity(number)
 
 
-#: What templates leave in these fields; vendor 0 does not exist.
+#: Values that templates leave in these fields; vendor 0 does not exist.
 _PLACEHOLDERS = (0, 0xFFFFFFFF)
 
 
@@ -100,12 +101,12 @@ def _real_identity(number: int | float) -> int | None:
 
 
 def _own_identity(entries: list[DescribedEntry], key: str) -> int | None:
-    """A number of the identity object 1018h by its default, None where it has none."""
+    """Return a number of the identity object 1018h by its default; None without a default."""
     value = next((e.default_raw for e in entries if e.key == key), None)
     return _real_identity(value) if isinstance(value, int) else None
 
 
-#: Keys of [DeviceInfo] and the bit rate in bit/s that each stands for (CiA 306-1 clause 4.5.2).
+#: Keys of [DeviceInfo] and their bit rates in bit/s (CiA 306-1 clause 4.5.2).
 _BIT_RATES = {f"baudrate_{kbit}": kbit * 1000 for kbit in (10, 20, 50, 125, 250, 500, 800, 1000)}
 
 
@@ -116,7 +117,7 @@ def _bit_rates(device: Section) -> tuple[int, ...]:
 
 
 class _Entries:
-    """Object sections to entries."""
+    """Converts object sections to entries."""
 
     def __init__(self, sections: dict[str, Section], name: str, report: ImportReport) -> None:
         self._sections = sections
@@ -188,8 +189,9 @@ class _Entries:
         return [
             entry
             for subindex, member in sorted(members.items())
-            # Subindex 0 only counts the others (CiA 301 clause 7.4.4), as a byte. One of another
-            # type is a value of its own: some makers put 603Fh:00 next to further subindices.
+            # Subindex 0 only contains the count (CiA 301 clause 7.4.4), as a byte. One of another
+            # type is a value of its own: some manufacturers put 603Fh:00 next to further
+            # subindices.
             if subindex > 0 or len(members) == 1 or self._is_value(member, parent)
             for entry in self._entry(index, subindex, member, parent, title)
         ]
@@ -283,7 +285,7 @@ class _Entries:
         return found
 
     def _deftype(self, code: int, place: str) -> DataType | None:
-        """Types that a file defines itself, as an editor does for values with limits."""
+        """Return a type defined by the file itself, as editors do for values with limits."""
         member = self._deftypes.get((code, 2)) or self._members.get(code, {}).get(2)
         if member is not None:
             base = parse_number(member.word("datatype"), place, self._report)
@@ -295,7 +297,7 @@ class _Entries:
         return None
 
     def _compare_with_lists(self, present: set[int]) -> None:
-        """The lists of objects often disagree with the sections; the sections count."""
+        """Note differences from the lists of objects, which are often wrong; the sections count."""
         for title in ("mandatoryobjects", "optionalobjects", "manufacturerobjects"):
             section = self._sections.get(title)
             if section is None:

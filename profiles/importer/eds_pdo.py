@@ -16,7 +16,7 @@ _IDENTIFIER = 0x7FF
 def read_pdos(
     entries: list[DescribedEntry], sections: dict[str, Section], name: str, report: ImportReport
 ) -> list[DescribedPdo]:
-    """Default mappings out of the defaults of 1600h… and 1A00h…."""
+    """Read default mappings from the defaults of 1600h… and 1A00h…."""
     by_key = {e.key: e for e in entries}
     keys = set(by_key)
     pdos: list[DescribedPdo] = []
@@ -52,7 +52,7 @@ def _layout(
     name: str,
     report: ImportReport,
 ) -> list[tuple[str | None, int]]:
-    """Keys and bits as delivered. Entries behind the number of subindex 0 are not in use."""
+    """Return keys and bits of the default mapping. Entries beyond subindex 0's count are unused."""
     place = f"{name} [{index:04X}]"
     count = parse_number(_default(sections, index, 0), place, report)
     layout: list[tuple[str | None, int]] = []
@@ -60,7 +60,7 @@ def _layout(
         value = entry.default_raw
         if entry.subindex == 0 or not isinstance(value, int) or value == 0:
             continue
-        # Where the file gives 0 next to entries, it is a template that nobody filled in.
+        # If the count is 0 although there are entries, it is a template that was not filled in.
         if count and entry.subindex > count:
             report.noted(
                 place, "description.mapping-behind-count", subindex=entry.subindex, count=count
@@ -72,7 +72,7 @@ def _layout(
             layout.append((key, bits))
         elif bits:
             layout.append((None, bits))
-            if value >> 16 & 0xFFFF >= 0x20:  # below are dummies that only fill space
+            if value >> 16 & 0xFFFF >= 0x20:  # lower indices are dummies for padding
                 report.left_out(place, "description.mapped-not-described", key=key)
     return layout
 
@@ -84,7 +84,7 @@ def _identifier(
     name: str,
     report: ImportReport,
 ) -> PdoIdentifier | None:
-    """The COB-ID as delivered, None where the file gives none that can be one."""
+    """Return the default COB-ID; None if the file states no valid one."""
     communication = index - 0x200
     text = _default(sections, communication, 1)
     place = f"{name} [{communication:04X}sub1]"

@@ -1,4 +1,4 @@
-"""Sections of EDS and DCF files, and what their headings mean (CiA 306-1 v1.3)."""
+"""Sections of EDS and DCF files, and the meaning of their headings (CiA 306-1 v1.3)."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from profiles.importer.report import ImportReport
 from profiles.importer.values import parse_number
 
 _MAX_LINES = 400_000
-#: Other characters that Python calls line ends stand within texts.
+#: Other characters that Python treats as line ends occur within texts.
 _LINE = re.compile(r"\r\r\n|\r\n|\n|\r")
 
 OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?$")
 SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
 COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
-#: The section that makes a DCF of an EDS; the standard spells it with one m.
+#: The section that distinguishes a DCF from an EDS; the standard spells it with one m.
 COMMISSIONING = ("devicecomissioning", "devicecommissioning")
-#: Begins an editor's remark behind a value: text may hold both, numbers and words of the standard
-#: cannot. The white space in front is not in the pattern: a search for it takes the square of its
-#: length, and a file may have a megabyte of it.
+#: Start of an editor's remark after a value: text may contain both, numbers and words of the
+#: standard cannot. White space before it is not in the pattern: searching for it takes quadratic
+#: time in its length, and a file may contain a megabyte of it.
 _REMARK = re.compile(r";|//")
 
 
@@ -31,18 +31,18 @@ class Section:
     values: dict[str, str] = field(default_factory=dict)
 
     def get(self, *names: str) -> str:
-        """The first of these values that is not empty: editors write keys without values."""
+        """Return the first of these values that is not empty: editors write keys without values."""
         return next((self.values[n] for n in names if self.values.get(n)), "")
 
     def word(self, *names: str) -> str:
-        """The same without a remark behind it, for numbers and words of the standard."""
+        """Return the same without a trailing remark, for numbers and words of the standard."""
         value = self.get(*names)
         remark = _REMARK.search(value)
         return value if remark is None else value[: remark.start()].rstrip()
 
 
 def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Section]:
-    """Sections by lower-case heading; of what comes twice the first counts."""
+    """Return sections by lower-case heading; of duplicates the first counts."""
     sections: dict[str, Section] = {}
     current: Section | None = None
     for number, raw in enumerate(_LINE.split(text)[:_MAX_LINES], start=1):
@@ -75,7 +75,7 @@ def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Secti
 
 
 def node_id_of(sections: dict[str, Section], name: str) -> int | None:
-    """The node-ID that a DCF was made for."""
+    """Return the node-ID for which a DCF was made."""
     for title in COMMISSIONING:
         if title in sections:
             text = sections[title].word("nodeid")

@@ -1,7 +1,7 @@
 """EtherCAT slave information (ESI) files.
 
-Source: ETG.2000 v1.0.10. Parsed without DTDs and entities and with a size limit, since these
-files come from anywhere.
+Source: ETG.2000 v1.0.10. Parsed without DTDs and entities and with a size limit, since these files
+come from untrusted sources.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _ROOTS = {name.lower(): name for name in ("EtherCATInfo", "EtherCATInfoList", "E
 
 @dataclass(frozen=True, slots=True)
 class EsiDevice:
-    """One device of an ESI file, to choose from: a file often holds a whole series."""
+    """One device of an ESI file for selection: a file often describes a whole series."""
 
     number: int
     name: str
@@ -60,7 +60,7 @@ class EsiDevice:
 
 @dataclass(slots=True)
 class EsiFile:
-    """An ESI file that has been parsed."""
+    """A parsed ESI file."""
 
     name: str
     report: ImportReport
@@ -69,7 +69,7 @@ class EsiFile:
 
 
 def esi_devices(file: EsiFile) -> tuple[EsiDevice, ...]:
-    """The devices of a file, in its order."""
+    """Return the devices of a file, in its order."""
     quiet = replace(file, report=ImportReport())
     return tuple(_choice(quiet, n) for n in range(len(file.devices)))
 
@@ -78,7 +78,7 @@ def read_device(file: EsiFile, device: int = 0) -> Description:
     """Read one device of an ESI file.
 
     Raises:
-        ImportFailed: no such device, or nothing in it.
+        ImportFailed: no such device, or it has no objects.
     """
     name = file.name
     if not 0 <= device < len(file.devices):
@@ -109,7 +109,7 @@ def read_device(file: EsiFile, device: int = 0) -> Description:
 
 
 def _bring_up(file: EsiFile, element: Element) -> BringUp:
-    """What the device prescribes, with the list of its modules where that is to be written."""
+    """Return the device's prescriptions, with the list of its modules if that is to be written."""
     rules = read_bring_up(element, file.name, file.report)
     modules = module_list(file.root, element)
     if modules is None:
@@ -118,10 +118,10 @@ def _bring_up(file: EsiFile, element: Element) -> BringUp:
 
 
 def _parsed(text: str) -> Element:
-    """The root of a document without DTD.
+    """Return the root of a document without DTD.
 
-    The reader of defusedxml refuses a DTD at the cost of Python's slow parser. Without these
-    letters there is none, and so no entity either: then the fast one reads the same.
+    The reader of defusedxml refuses a DTD at the cost of Python's slow parser. Without this string
+    there is no DTD, and so no entity either: the fast parser then gives the same result.
     """
     if "<!DOCTYPE" in text:
         refused: Element = fromstring(text, forbid_dtd=True)
@@ -193,7 +193,7 @@ def _choice(file: EsiFile, number: int) -> EsiDevice:
 
 
 def _has_control_word(file: EsiFile, element: Element) -> bool:
-    """Whether the device or a module of it describes 6040h, in its dictionary or in a PDO."""
+    """Return whether the device or a module of it describes 6040h, in its dictionary or a PDO."""
     return any(
         text_of(child(item, "Index")).lower().lstrip("#0x").lstrip("0") == "6040"
         or text_of(child(item, "Index")).strip() == str(0x6040)
@@ -210,7 +210,7 @@ def _has_control_word(file: EsiFile, element: Element) -> bool:
 
 
 def _contents(file: EsiFile, element: Element) -> tuple[list[DescribedEntry], list[DescribedPdo]]:
-    """Dictionary and PDOs of a device and of the modules that it has as delivered."""
+    """Read dictionary and PDOs of a device and of its default modules."""
     parts = parts_of(file.root, element)
     for part in parts[1:]:
         file.report.noted(file.name, "description.module", module=tidy(name_of(part.element)))

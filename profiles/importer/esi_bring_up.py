@@ -1,4 +1,4 @@
-"""What an ESI device prescribes for its way to Operational (ETG.2000 v1.0.10)."""
+"""Prescriptions of an ESI device on the way to Operational (ETG.2000 v1.0.10)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _MOST_COMMANDS, _MOST_MODES, _MOST_MANAGERS, _MOST_BYTES = 1000, 64, 16, 4096
 
 
 def read_bring_up(element: Element, file: str, report: ImportReport) -> BringUp:
-    """The prescriptions of one ``Device`` element; parts that are missing stay empty."""
+    """Read the prescriptions of one ``Device`` element; missing parts stay empty."""
     return _Reader(element, file, report).read()
 
 
@@ -89,7 +89,7 @@ class _Reader:
     def _commands(self) -> tuple[InitCommand, ...]:
         found: list[InitCommand] = []
         coe = child(self._mailbox, "CoE")
-        # Some files have the list of an ENI, one level deeper.
+        # Some files contain the list of an ENI, one level deeper.
         for item in (*children(coe, "InitCmd"), *children(child(coe, "InitCmds"), "InitCmd")):
             place = f"{self._file}: InitCmd"
             index = whole_number(text_of(child(item, "Index")), place, self._report)
@@ -101,7 +101,8 @@ class _Reader:
                 )
                 continue
             for transition in children(item, "Transition"):
-                # TwinCAT shows commands of the file as <PS>, and some tools write them so.
+                # TwinCAT shows commands of the file as <PS>, and some tools write them in this
+                # form.
                 letters = text_of(transition).upper().strip("<>")
                 if _TRANSITION.fullmatch(letters) is None or not 0 <= subindex <= 255:
                     self._report.left_out(
@@ -162,7 +163,8 @@ class _Reader:
         place = f"{self._file}: OpMode {name[:20]}"
         word = text_of(child(mode, "AssignActivate")) or "0"
         if re.fullmatch(r"0\d{3}", word):
-            # Register bits: nobody writes them in decimal with a leading zero.
+            # Register bits: a leading zero means hexadecimal, as decimal numbers are written
+            # without.
             self._report.repaired(place, "description.hexadecimal", value=word)
             word = f"#x{word}"
         activate = whole_number(word, place, self._report)
@@ -199,7 +201,7 @@ class _Reader:
         return SyncSignal(cycle_ns=max(length, 0), factor=factor or 1, shift_ns=shift_ns)
 
     def _signed(self, text: str, place: str) -> int | None:
-        """Factors and shifts may be negative (ETG.2000 table 38)."""
+        """Read a number that may be negative, as factors and shifts are (ETG.2000 table 38)."""
         bare = text.strip()
         number = whole_number(bare.removeprefix("-"), place, self._report)
         return -number if number is not None and bare.startswith("-") else number
@@ -236,7 +238,7 @@ class _Reader:
         return number if number is not None and number <= 0xFF else None
 
     def _hex(self, text: str, place: str) -> str | None:
-        """Bytes in upper-case hex; some files put #x before them or spaces between them."""
+        """Return bytes in upper-case hex; files may have a prefix #x or spaces between them."""
         bare = "".join(text.split())
         bare = bare[2:] if bare.lower().startswith(("#x", "0x")) else bare
         try:
@@ -248,7 +250,7 @@ class _Reader:
 
 
 def name_of_comment(item: Element) -> str:
-    """The English comment of a command where there are several, else the first."""
+    """Return the English comment of a command if there are several, else the first."""
     comments = children(item, "Comment")
     for comment in comments:
         if (comment.get("LcId") or "1033").strip() in ("1033", "9"):

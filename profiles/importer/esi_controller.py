@@ -1,6 +1,6 @@
-"""What a maker's ESI file says of a slave's controller: mailboxes, sync managers and clock.
+"""Slave controller data in a manufacturer's ESI file: mailboxes, sync managers and clock.
 
-Without it no complete ENI can be written: the addresses are the slave's own (ETG.2000).
+Without them no complete ENI can be written: the addresses are specific to the slave (ETG.2000).
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ _KINDS: dict[str, SyncKind] = {
     "inputs": "inputs",
 }
 _MEMORY, _MEMORY_END = 0x1000, 0x10000
-#: What the smallest mailbox of CoE holds (ETG.1000.6), and the largest length of a sync manager.
+#: Size of the smallest CoE mailbox (ETG.1000.6), and the largest length of a sync manager.
 _SHORTEST_MAILBOX, _LONGEST = 16, 0x7FFF
-#: A drive with a clock whose file names no way to use it: SYNC0 without SYNC1.
+#: Default for a drive with a clock whose file has no operation mode: SYNC0 without SYNC1.
 _SYNC0 = 0x0300
 
 
 @dataclass(frozen=True, slots=True)
 class SyncManager:
-    """One sync manager by its number; ``length`` is the mailbox's, 0 for process data."""
+    """One sync manager by its number; ``length`` is that of a mailbox, 0 for process data."""
 
     number: int
     kind: SyncKind
@@ -42,7 +42,7 @@ class SyncManager:
 
 @dataclass(frozen=True, slots=True)
 class SlaveController:
-    """Sync managers and clock of a slave; ``assign_activate`` 0 is no clock."""
+    """Sync managers and clock of a slave; ``assign_activate`` 0 means no clock."""
 
     physics: str
     sync_managers: tuple[SyncManager, ...]
@@ -55,29 +55,29 @@ class SlaveController:
     source: str
 
     def manager(self, kind: SyncKind) -> SyncManager | None:
-        """The first one of a kind."""
+        """Return the first one of a kind."""
         return next((each for each in self.sync_managers if each.kind == kind), None)
 
 
 class NoController(ImportFailed):
-    """A sound file without the controller that is looked for."""
+    """A valid file without the requested controller."""
 
 
-#: Vendor ID, product code and revision number of a drive; the revision may not be known.
+#: Vendor ID, product code and revision number of a drive; the revision may be unknown.
 Wanted: TypeAlias = tuple[int, int, int | None]
 
 
 def read_controllers(
     sources: Iterable[tuple[bytes, str]], wanted: Sequence[Wanted]
 ) -> tuple[SlaveController, ...]:
-    """The controllers of these drives in their order, each of the first file that has it.
+    """Return the controllers of these drives in their order, each from the first file that has it.
 
-    ``sources`` are ESI files with their names; of each one is in memory at a time. Where a
-    revision is not known or not in the file, the newest is taken.
+    ``sources`` are ESI files with their names; only one of them is in memory at a time. If a
+    revision is unknown or not in the file, the newest is used.
 
     Raises:
-        NoController: no file has such a device, or one without CoE mailboxes.
-        ImportFailed: a file is no ESI file, or one that is damaged.
+        NoController: no file has such a device, or only one without CoE mailboxes.
+        ImportFailed: a file is not an ESI file, or is damaged.
     """
     found: dict[int, SlaveController] = {}
     missing: dict[int, NoController] = {}
@@ -99,13 +99,13 @@ def read_controllers(
 
 @dataclass(frozen=True, slots=True)
 class ControllersTask:
-    """`read_controllers` for the process of an import; see `profiles.importer.process`."""
+    """`read_controllers` as a task of the import process; see `profiles.importer.process`."""
 
     sources: tuple[tuple[bytes, str], ...]
     wanted: tuple[Wanted, ...]
 
     def run(self) -> dict[str, object]:
-        """``controllers``, or ``refused`` with code and facts; ``sound`` shows `NoController`."""
+        """Return ``controllers``, or ``refused`` with code and facts; ``sound``: NoController."""
         try:
             found = read_controllers(self.sources, self.wanted)
         except ImportFailed as error:

@@ -1,4 +1,4 @@
-"""Devices of modules: the modules that stand in their slots as delivered (ETG.2000, ETG.5001)."""
+"""Modular devices: the modules in their slots by default (ETG.2000, ETG.5001)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MODULE_LIST = 0xF030
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The device itself, or a module; how far its objects and PDOs lie behind those of slot 0."""
+    """The device itself, or a module; the offsets of its objects and PDOs from those of slot 0."""
 
     element: Element
     index_shift: int = 0
@@ -25,8 +25,10 @@ class Part:
 
 
 def parts_of(root: Element, device: Element) -> list[Part]:
-    """The device and the modules of its slots; of a device without slots and without objects the
-    first module that has some."""
+    """Return the device and the default modules of its slots.
+
+    For a device without slots and without objects, the first module that has some.
+    """
     parts = [Part(device)]
     modules = children(child(child(root, "Descriptions"), "Modules"), "Module")
     slots = child(device, "Slots")
@@ -47,7 +49,7 @@ def parts_of(root: Element, device: Element) -> list[Part]:
 
 
 def _slots(slots: Element | None) -> list[Element]:
-    """One for each slot: ``MinInstances`` of a ``Slot`` follow one another (ETG.2000)."""
+    """Return one element per slot: ``MinInstances`` repeats a ``Slot`` (ETG.2000)."""
     found: list[Element] = []
     for slot in children(slots, "Slot"):
         count = _number(attribute_of(slot, "MinInstances")) or 1
@@ -56,7 +58,7 @@ def _slots(slots: Element | None) -> list[Element]:
 
 
 def overwritten(pdo: Element, device: Part, modules: list[Part]) -> bool:
-    """Whether a module brings the PDO that the device itself has under the same index."""
+    """Return whether a module provides the PDO that the device has under the same index."""
     if not flag_of(pdo, "OverwrittenByModule"):
         return False
     index = pdo_index(pdo, device)
@@ -67,14 +69,14 @@ def overwritten(pdo: Element, device: Part, modules: list[Part]) -> bool:
 
 
 def pdo_index(pdo: Element, part: Part) -> int | None:
-    """Where it lies in this slot; None where the file gives no number."""
+    """Return the index in this slot; None if the file states no number."""
     index = _number(text_of(child(pdo, "Index")))
     shifts = flag_of(child(pdo, "Index"), "DependOnSlot")
     return index + part.pdo_shift if index is not None and shifts else index
 
 
 def module_list(root: Element, device: Element) -> InitCommand | None:
-    """The write of F030h that gives the device its modules; None where the file asks for none."""
+    """Return the write of F030h that lists the device's modules; None if not required."""
     slots = child(device, "Slots")
     if slots is None or not flag_of(slots, "DownloadModuleIdentList"):
         return None
@@ -96,7 +98,7 @@ def module_list(root: Element, device: Element) -> InitCommand | None:
 
 
 def dictionaries_of(element: Element) -> list[Element]:
-    """The dictionaries with objects of a device or module."""
+    """Return the dictionaries with objects of a device or module."""
     found = []
     for profile in children(element, "Profile"):
         dictionary = child(profile, "Dictionary")
@@ -106,7 +108,7 @@ def dictionaries_of(element: Element) -> list[Element]:
 
 
 def _delivered(slot: Element, number: int) -> int | None:
-    """The module that is in a slot by default; in the first slot the first that may."""
+    """Return the default module of a slot; in the first slot the first one allowed."""
     idents = children(slot, "ModuleIdent")
     marked = [each for each in idents if flag_of(each, "Default")]
     needed = number == 0 or bool(_number(attribute_of(slot, "MinInstances")))

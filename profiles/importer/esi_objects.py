@@ -22,8 +22,8 @@ from profiles.importer.values import (
 from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.schema import Access, DataType, PdoMapping, Raw
 
-#: Names that only count: "SubIndex 003", "Element 3".
 _UNSIGNED_BITS = {"UINT8": 8, "UINT16": 16, "UINT32": 32, "UINT64": 64}
+#: Names that only contain a number: "SubIndex 003", "Element 3".
 _NUMBERED = re.compile(r"(?:sub\s*index|element|entry|item)?\s*\d+", re.I)
 
 
@@ -36,16 +36,16 @@ class DictionaryReader:
         self._file = file
         self._report = report
         self._shift = shift
-        """How far objects of a module lie behind those of the first slot."""
+        """Offset of a module's objects from those of the first slot."""
         self._types = EsiTypes(child(dictionary, "DataTypes"), file, report)
         self._objects = children(child(dictionary, "Objects"), "Object")
         self._preop_only: list[str] = []
 
     def entries(self) -> list[DescribedEntry]:
-        """One for each subindex, in the order of the file."""
+        """Return one entry per subindex, in the order of the file."""
         found = [entry for element in self._objects for entry in self._object(element)]
         writable = sum(entry.access != "ro" for entry in found)
-        # Where nearly every object is so, the remark says nothing about any of them.
+        # If nearly every object has this restriction, the remark carries no information.
         if self._preop_only and 2 * len(self._preop_only) < writable:
             first = ", ".join(self._preop_only[:5])
             more = len(self._preop_only) - 5
@@ -85,13 +85,13 @@ class DictionaryReader:
             ]
         names = {member.name for member in members if member.name}
         by_name = any(name_of(info) in names for info in infos)
-        # Files that give no values for subindex 0 begin their list with subindex 1.
+        # Files without values for subindex 0 start their list with subindex 1.
         skipped = not by_name and members[0].subindex == 0 and len(infos) == len(members) - 1
         return [
             self._entry(index, named, title, info, element, place)
             for position, member in enumerate(members)
             for named, info in (_info_of(infos, position - skipped, member, names),)
-            # Subindex 0 only counts the others (CiA 301 clause 7.4.4).
+            # Subindex 0 only contains the count (CiA 301 clause 7.4.4).
             if member.subindex > 0 or len(members) == 1
         ]
 
@@ -138,7 +138,7 @@ class DictionaryReader:
         )
 
     def _enumeration(self, name: str, data_type: DataType | None, place: str) -> dict[int, str]:
-        """Texts by raw value. Below zero in a type without sign it is two's complement."""
+        """Return texts by raw value. A negative value in an unsigned type is two's complement."""
         found: dict[int, str] = {}
         for value, words in self._types.enumeration(name).items():
             size = _UNSIGNED_BITS.get(data_type or "")
@@ -188,7 +188,7 @@ class DictionaryReader:
 
 
 def _hex_data(text: str, place: str, report: ImportReport) -> int | None:
-    """``xs:hexBinary`` of ETG.2000: bytes as they travel, lowest first. Some write a number."""
+    """Decode ``xs:hexBinary`` of ETG.2000: bytes as transferred, lowest first, or a number."""
     bare = text.strip()
     if bare.lower().startswith(("#x", "0x")):
         number = parse_number(bare, place, report)
@@ -203,10 +203,10 @@ def _hex_data(text: str, place: str, report: ImportReport) -> int | None:
 def _info_of(
     infos: list[Element], position: int, member: Member, names: set[str]
 ) -> tuple[Member, Element | None]:
-    """A member with its values: by name where the names are unique, else by place.
+    """Return a member with its values: by name if the names are unique, else by position.
 
-    What stands at its place under the name of another member (``names``) is that one's.
-    An element of an array has only its number for a name, and the object may name it.
+    Values under the name of another member (``names``) belong to that one. An element of an array
+    has only its number as a name, and the object may name it.
     """
     named = [i for i in infos if member.name and name_of(i) == member.name]
     found = named[0] if len(named) == 1 else None
@@ -223,7 +223,7 @@ def _info_of(
 def _rights(
     flags: Element | None, fallback: Element | None, place: str, report: ImportReport
 ) -> tuple[Access, PdoMapping, bool]:
-    """Access, mapping, and whether it may be written in PreOP or SafeOP only."""
+    """Return access, mapping, and whether it is writable in PreOP or SafeOP only."""
     preop_only = False
     access_element = child(flags, "Access")
     if access_element is None:

@@ -12,7 +12,7 @@ from profiles.importer.values import named_type, tidy, whole_number
 from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.schema import Access
 
-#: Bits of a whole object by its type; others are mapped as many bits as the file says.
+#: Bits of a whole object by its type; for others, the file states the mapped bits.
 _BITS = {
     "BOOL": 1, "INT8": 8, "UINT8": 8, "INT16": 16, "UINT16": 16, "INT32": 32, "UINT32": 32,
     "INT64": 64, "UINT64": 64, "REAL32": 32,
@@ -23,7 +23,7 @@ _MOST_PADDING = 1486 * 8
 
 
 class PdoReader:
-    """Reads ``RxPdo`` and ``TxPdo``; objects that only a PDO names are added to ``entries``."""
+    """Reads ``RxPdo`` and ``TxPdo``; objects that occur only in a PDO are added to ``entries``."""
 
     def __init__(
         self,
@@ -41,9 +41,9 @@ class PdoReader:
         self._seen = seen
 
     def read(self, pdo: Element, direction: Literal["rx", "tx"]) -> list[DescribedPdo]:
-        """The PDO; none where it has no index, or is fixed and empty.
+        """Return the PDO in a list; empty if it has no index, or is fixed and empty.
 
-        A PDO without contents that can be written is one to be filled.
+        A PDO without contents that can be written is kept, to be filled.
         """
         place = f"{self._file}: {'RxPdo' if direction == 'rx' else 'TxPdo'}"
         index = whole_number(text_of(child(pdo, "Index")), place, self._report)
@@ -83,9 +83,9 @@ class PdoReader:
     def _parts(
         self, item: Element, direction: Literal["rx", "tx"], where: str
     ) -> list[tuple[str | None, int]]:
-        """The stretches of one entry of the PDO; index 0 is padding.
+        """Return the parts of one entry of the PDO; index 0 is padding.
 
-        Long padding becomes several. Empty: the entry cannot be understood.
+        Long padding is split. Empty: the entry cannot be interpreted.
         """
         object_index = whole_number(text_of(child(item, "Index")), where, self._report)
         bits = whole_number(text_of(child(item, "BitLen")), where, self._report)
@@ -119,7 +119,7 @@ class PdoReader:
         return [(key, bits)] if bits else self._padding(bits, where)
 
     def _padding(self, bits: int | None, where: str) -> list[tuple[str | None, int]]:
-        """What follows keeps its place: padding is never dropped without a finding."""
+        """Return padding, never dropped without a finding, as what follows keeps its offset."""
         if not bits or bits > _MOST_PADDING:
             self._report.left_out(where, "description.padding-unknown", bits=bits or 0)
             return []
@@ -131,7 +131,7 @@ class PdoReader:
         return None if entry is None or entry.type is None else _BITS.get(entry.type)
 
     def _whole_objects(self, layout: list[tuple[str | None, int]]) -> bool:
-        """Whether the list of keys says it all: no padding, no bits, nothing twice."""
+        """Return whether the keys describe it fully: no padding, no single bits, no duplicates."""
         keys = [key for key, _ in layout]
         return len(set(keys)) == len(keys) and all(
             key is not None and bits % 8 == 0 and bits == self._natural_bits(key)

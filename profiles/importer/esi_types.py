@@ -19,7 +19,7 @@ _INLINE = re.compile(r"ARRAY\s*\[\s*(\d{1,3})\s*\.\.\s*(-?\d{1,3})\s*\]\s*OF\s+(
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One subindex of a type. ``flags`` is its own Flags element, where it has one."""
+    """One subindex of a type. ``flags`` is its own Flags element, if it has one."""
 
     subindex: int
     name: str
@@ -29,7 +29,7 @@ class Member:
 
 
 class EsiTypes:
-    """The ``DataTypes`` of one dictionary. Types may refer to others, even wrongly in a circle."""
+    """The ``DataTypes`` of one dictionary. Types may refer to others, wrongly even in a cycle."""
 
     def __init__(self, element: Element | None, file: str, report: ImportReport) -> None:
         self._file = file
@@ -41,7 +41,7 @@ class EsiTypes:
                 self._types[name] = data_type
 
     def members(self, name: str) -> list[Member]:
-        """Subindices of a record or array type; empty for a plain one."""
+        """Return the subindices of a record or array type; empty for a plain one."""
         element = self._types.get(name)
         members: list[Member] = []
         for position, item in enumerate(children(element, "SubItem")):
@@ -95,7 +95,7 @@ class EsiTypes:
         ]
 
     def _array(self, name: str) -> tuple[int, int, str] | None:
-        """First subindex, number and element type of an array type."""
+        """Return first subindex, number and element type of an array type."""
         element = self._types.get(name)
         info = child(element, "ArrayInfo")
         if info is not None:
@@ -112,13 +112,13 @@ class EsiTypes:
         return max(int(match[1]), 1), int(match[2]) - int(match[1]) + 1, match[3]
 
     def _resolves_to_text(self, base: str, name: str) -> bool:
-        """Arrays of characters are text or bytes, not subindices."""
+        """Return whether an array of characters is text or bytes instead of subindices."""
         return base.upper() in ("BYTE", "CHAR") and not re.search(r"ARR", name, re.I)
 
     def base(self, name: str, bits: int | None) -> DataType | None:
-        """The plain type behind ``name``."""
+        """Return the plain type to which ``name`` resolves."""
         if _INLINE.fullmatch(name):
-            return "OCTETS"  # although some files describe it once more with a base type BYTE
+            return "OCTETS"  # although some files define it again with a base type BYTE
         seen: set[str] = set()
         for _ in range(_DEEPEST):
             element = self._types.get(name)
@@ -134,11 +134,11 @@ class EsiTypes:
                 break
             name = following
         found = named_type(name, bits)
-        # Enumerations and the like have a name of their own and only a length.
+        # Enumerations and similar types have a name of their own and only a length.
         return found if found is not None else named_type("", bits)
 
     def enumeration(self, name: str) -> dict[int, str]:
-        """Texts of an enumeration's values; empty for other types."""
+        """Return the texts of an enumeration's values; empty for other types."""
         element = self._types.get(name)
         texts: dict[int, str] = {}
         for info in children(element, "EnumInfo"):

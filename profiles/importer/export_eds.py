@@ -1,4 +1,4 @@
-"""A profile as a CANopen electronic data sheet, with values as a device configuration file.
+"""Export of a profile as CANopen EDS and, with values, as device configuration file (DCF).
 
 Source: CiA 306-1 v1.3.
 """
@@ -22,10 +22,10 @@ _NUMBERS = ("DefaultValue", "ParameterValue", "LowLimit", "HighLimit")
 
 
 def export_eds(profile: Profile, created: datetime, file_name: str | None = None) -> str:
-    """The profile's objects as EDS text with CRLF line ends.
+    """Return the profile's objects as EDS text with CRLF line ends.
 
-    Parameters that only Modbus reaches have no object and are left out. ``created`` stands in
-    the file, so that the same profile and time give the same text.
+    Parameters that only Modbus can access have no object and are left out. ``created`` is written
+    to the file, so that the same profile and time give the same text.
     """
     return _file(profile, created, file_name or f"{profile.drive}.eds", [], {})
 
@@ -40,12 +40,12 @@ def export_dcf(
     node_id: int | None = None,
     reals_as_bits: bool = False,
 ) -> str:
-    """The same with ``ParameterValue`` for each key of ``values`` (clause 5.3: a DCF).
+    """Return a DCF: the same with ``ParameterValue`` for each key of ``values`` (clause 5.3).
 
-    ``reals_as_bits`` writes a REAL32 as the hexadecimal number of its bits, which some tools
-    want; others want it decimal.
+    ``reals_as_bits`` writes a REAL32 as the hexadecimal number of its bits, as some tools require;
+    others require decimal.
     """
-    commissioning = ["[DeviceComissioning]"]  # the standard spells it so
+    commissioning = ["[DeviceComissioning]"]  # spelled as in the standard
     if node_id is not None:
         commissioning.append(f"NodeID=0x{node_id:02X}")
     commissioning += [f"NodeName={_text(node_name)}", "CANopenManager=0", ""]
@@ -54,7 +54,7 @@ def export_dcf(
 
 
 def _with_bits(text: str) -> str:
-    """Numbers of REAL32 objects as their bits, IEEE 754, in hexadecimal."""
+    """Write numbers of REAL32 objects as their IEEE 754 bits, in hexadecimal."""
     lines, real = [], False
     for line in text.split("\r\n"):
         name, equals, value = line.partition("=")
@@ -132,9 +132,9 @@ def _lists(objects: Collection[int]) -> list[str]:
 
 
 def _mandatory(index: int, profile: Profile) -> list[str]:
-    """Objects that every device has (CiA 301 clause 7.5.1), where the profile has none of its own.
+    """Return objects that every device has (CiA 301 clause 7.5.1), if missing in the profile.
 
-    Tools refuse a file without them. A default that is not known stays empty.
+    Tools refuse a file without them. An unknown default stays empty.
     """
 
     def entry(section: str, name: str, code: int, default: int | None) -> list[str]:
@@ -222,7 +222,7 @@ def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw], pdos: _Pd
 
 
 #: COB-IDs of the first four PDOs (CiA 301 clause 7.3.3, pre-defined connection set), which depend
-#: on the node number and so are no default of a profile. Without them clients take no PDO.
+#: on the node number and so are not defaults of a profile. Without them clients use no PDO.
 _COB_IDS = {
     f"{first + number:04X}:01": f"$NODEID+0x{base + 0x100 * number:X}"
     for first, base in ((0x1400, 0x200), (0x1800, 0x180))
@@ -231,7 +231,7 @@ _COB_IDS = {
 
 
 class _Pdos:
-    """What the profile says of its PDOs beyond the defaults of their objects."""
+    """Data of the profile on its PDOs beyond the defaults of their objects."""
 
     def __init__(self, profile: Profile) -> None:
         sets = profile.pdo.sets if profile.pdo is not None else ()
@@ -256,5 +256,5 @@ def _value(parameter: Parameter, pdos: _Pdos) -> str:
 
 
 def _text(text: str) -> str:
-    """One line; CiA 306 allows at most 241 characters."""
+    """Return one line; CiA 306 allows at most 241 characters."""
     return " ".join(text.split())[:241]

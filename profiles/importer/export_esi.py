@@ -1,7 +1,7 @@
-"""A profile as an EtherCAT slave information file.
+"""Export of a profile as an EtherCAT slave information file.
 
-Source: ETG.2000 v1.0.10. What the profile does not hold (sizes of text, pictures, groups) is left
-out or given the smallest form that the format allows.
+Source: ETG.2000 v1.0.10. Data that the profile does not contain (sizes of text, pictures, groups)
+are left out or written in the smallest form that the format allows.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _BITS: dict[DataType, int] = {
     "UINT32": 32, "UINT64": 64, "REAL32": 32,
 }  # fmt: skip
 _TEXT_BYTES = 32
-"""Where nobody says how long a text is."""
+"""Length of a text of unknown size."""
 _MANAGER_NAMES = {
     "mailbox_out": "MBoxOut",
     "mailbox_in": "MBoxIn",
@@ -33,13 +33,13 @@ _PROTOCOLS = {"aoe": "AoE", "eoe": "EoE", "foe": "FoE", "soe": "SoE", "voe": "Vo
 
 
 def export_esi(profile: Profile) -> bytes:
-    """The profile's identity, objects, PDOs and way to Operational as XML in UTF-8.
+    """Return the profile's identity, objects, PDOs and bring-up data as XML in UTF-8.
 
-    Parameters that only Modbus reaches have no object and are left out.
+    Parameters that only Modbus can access have no object and are left out.
     """
     root = Element("EtherCATInfo", Version="1.0")
     vendor = SubElement(root, "Vendor")
-    # A number that is unknown is left out: a wrong one would fit another drive.
+    # An unknown number is left out: a wrong one would match another drive.
     if profile.identity.vendor_id is not None:
         _text(vendor, "Id", _hex(profile.identity.vendor_id, 8))
     _text(vendor, "Name", profile.identity.maker)
@@ -80,7 +80,7 @@ def _hex(value: int, digits: int = 4) -> str:
     return f"#x{value:0{digits}X}"
 
 
-def _flag(said: bool | None) -> str | None:  # three values: nobody may have said
+def _flag(said: bool | None) -> str | None:  # three values: it may be unknown
     return None if said is None else str(int(said))
 
 
@@ -155,7 +155,7 @@ def _object(types: Element, objects: Element, index: int, members: list[Paramete
     _text(element, "Type", f"DT{index:04X}")
     own_size = _text(element, "BitSize", "0")
     info = SubElement(element, "Info")
-    # ETG.2000: subindex 0 takes 16 bits of the record, of which 8 are used.
+    # ETG.2000: subindex 0 occupies 16 bits of the record, of which 8 are used.
     start = 16
     if not any(p.subindex == 0 for p in members):
         _member(record, 0, "SubIndex 000", "USINT", 8, 0)
@@ -220,7 +220,7 @@ def _info(info: Element, parameter: Parameter) -> None:
 
 
 def _data(value: Raw | None, kind: DataType) -> str | None:
-    """Bytes as they travel, in hex; None where there is no value of this type."""
+    """Return the bytes as transferred, in hex; None without a value of this type."""
     if value is None or isinstance(value, str):
         return None
     if kind == "REAL32":

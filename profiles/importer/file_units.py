@@ -1,7 +1,7 @@
-"""Units of the motion objects as a maker's file states them, each with who states it.
+"""Units of the motion objects as stated in a manufacturer's file, each with its origin.
 
 Source: CiA 402-2 objects 60A8h to 60AAh (unit codes), and the units that a file prints at the
-objects themselves. The standard's own "increments" is nobody's statement: makers use others.
+objects themselves. The standard's own "increments" is only a default: manufacturers use others.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from profiles.importer.description import DescribedEntry
 from profiles.schema import UnitOrigin, UnitSpec
 from profiles.si_unit import SiUnit, decode_si_unit
 
-#: Object with the unit's code, and the setpoint object whose printed unit counts otherwise.
+#: Object with the unit code, and the setpoint object whose printed unit is used without a code.
 _QUANTITIES = {
     "position": ("60A8:00", "607A:00"),
     "velocity": ("60A9:00", "60FF:00"),
     "acceleration": ("60AA:00", "6083:00"),
 }
-#: How the generic profile marks objects that are in one of the motion units.
+#: Marks of the generic profile for objects in one of the motion units.
 _MARKS = {"inc": "position", "inc/s": "velocity", "inc/s²": "acceleration"}
-#: Encoder increments whatever the unit of positions is (CiA 402-2).
+#: In encoder increments, whatever the unit of positions is (CiA 402-2).
 _INTERNAL = frozenset({"6063:00", "60FC:00", "608F:01", "60E4:01"})
 
 
 class FileUnits:
-    """What one file says of the units of position, velocity and acceleration."""
+    """Units of position, velocity and acceleration in one file."""
 
     def __init__(self, entries: Iterable[DescribedEntry]) -> None:
         by_key = {entry.key: entry for entry in entries}
@@ -38,7 +38,7 @@ class FileUnits:
         for quantity, (key, target) in _QUANTITIES.items():
             code = by_key[key].default_raw if key in by_key else None
             if isinstance(code, int) and code != 0:
-                # A code is 32 bits, whatever sign the file gives its type.
+                # A code has 32 bits, whatever the sign of its type in the file.
                 self._codes[quantity] = code & 0xFFFFFFFF
                 unit = decode_si_unit(code & 0xFFFFFFFF)
                 if unit is not None and _is_of(quantity, unit):
@@ -47,10 +47,10 @@ class FileUnits:
                 self._printed[quantity] = by_key[target].unit
 
     def of(self, key: str, printed: str, standard: str) -> tuple[str, float]:
-        """Unit of an object, and what one raw step is in it.
+        """Return the unit of an object, and the value of one raw step in it.
 
-        ``printed`` is what the file says at the object, ``standard`` what the generic profile has.
-        A motion unit that nobody states is shown as none: the number is raw.
+        ``printed`` is the unit that the file states at the object, ``standard`` that of the generic
+        profile. A motion unit that is not stated is returned empty: the number is raw.
         """
         quantity = _MARKS.get(standard)
         if key in _INTERNAL or quantity is None:
@@ -65,7 +65,7 @@ class FileUnits:
         return ("inc" if quantity == "position" and quantity not in self._held else ""), 1.0
 
     def spec(self, base: UnitSpec, present: frozenset[str]) -> UnitSpec:
-        """Units of the profile; ``base`` has the standard's, ``present`` the keys that exist."""
+        """Return the profile's units; ``base`` has the standard's, ``present`` existing keys."""
 
         def existing(key: str | None) -> str | None:
             return key if key in present else None
@@ -77,7 +77,7 @@ class FileUnits:
             if quantity in self._stated:
                 texts[quantity] = self._stated[quantity].name
             elif quantity in self._codes:
-                # Kept as it stands: no reader takes it for a unit that it knows.
+                # Kept unchanged: no reader takes it for a known unit.
                 texts[quantity] = f"{key[:4]}h = {self._codes[quantity]:08X}h"
             elif quantity in self._printed:
                 texts[quantity] = self._printed[quantity]
@@ -98,7 +98,7 @@ class FileUnits:
 
 
 def _is_of(quantity: str, unit: SiUnit) -> bool:
-    """Whether the unit has the quantity's dimension: a speed is no position."""
+    """Return whether the unit has the quantity's dimension: a speed is not a position."""
     if quantity == "position":
         return unit.denominator.value == 0
     if quantity == "velocity":
@@ -107,7 +107,7 @@ def _is_of(quantity: str, unit: SiUnit) -> bool:
 
 
 def _shown(unit: SiUnit) -> tuple[str, float]:
-    """A unit without a number in its name, and the step that the number stands for."""
+    """Return a unit without a number in its name, and the step that the number represents."""
     bare = SiUnit(0, unit.numerator, unit.denominator)
     if unit.name.endswith(f" {bare.name}"):
         return bare.name, unit.factor

@@ -1,4 +1,4 @@
-"""From a file to a profile, and from a profile to a folder that the loader reads."""
+"""From a description file to a profile, and from a profile to a folder for the loader."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import CLASS_FIELDS
 from profiles.schema import Profile
 
-#: libyaml's writer where PyYAML was built with it; ten times as fast.
+#: libyaml's writer if PyYAML was built with it; ten times as fast.
 _SafeDumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 class _PlainDumper(_SafeDumper):  # type: ignore[misc, valid-type]
-    """For the data of a model: texts and mappings are most of it, and none is there twice."""
+    """YAML dumper for model data: mostly texts and mappings, and no shared objects."""
 
     def represent_data(self, data: object) -> yaml.Node:
         if type(data) is str:
@@ -37,7 +37,7 @@ class _PlainDumper(_SafeDumper):  # type: ignore[misc, valid-type]
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """A large file becomes a million objects without cycles: looking for those takes a quarter."""
+    """Disable garbage collection: scanning the million objects of a large file takes 25 %."""
     collects = gc.isenabled()
     gc.disable()
     try:
@@ -56,11 +56,11 @@ def import_file(
     product_code: int | None = None,
     revision: int | None = None,
 ) -> ImportedProfile:
-    """A profile from an ESI, EDS or DCF file, distinguished by their contents.
+    """Create a profile from an ESI, EDS or DCF file, distinguished by their contents.
 
-    Of an ESI file with several devices the one with ``product_code`` (and ``revision``) is
-    taken; without them the newest revision of the first product that has 6040h. The result says
-    which others there are.
+    From an ESI file with several devices the one with ``product_code`` (and ``revision``) is used;
+    without them the newest revision of the first product that has 6040h. The result lists the
+    others.
 
     Raises:
         ImportFailed: not such a file, or nothing usable in it.
@@ -75,7 +75,7 @@ def import_file(
     return build_profile(read_eds(data, name, report), report, drive=drive)
 
 
-#: How files begin that are handed in for a description, and what is said of them.
+#: Beginnings of other files that users submit by mistake, and the message for each.
 _OTHER_FILES = (
     (rb"PK\x03\x04|\x1f\x8b|Rar!|7z\xbc\xaf", "description.archive"),
     (rb"%PDF", "description.pdf"),
@@ -91,7 +91,7 @@ def _refuse_what_is_known(data: bytes, name: str) -> None:
 
 
 def is_xml(data: bytes) -> bool:
-    """Whether a file is to be read as ESI rather than as EDS."""
+    """Return whether a file is to be read as ESI rather than as EDS."""
     start = data[:400].lstrip(b"\xef\xbb\xbf\xff\xfe\0 \t\r\n")
     return start.startswith((b"<", b"\0<"))
 
@@ -99,7 +99,7 @@ def is_xml(data: bytes) -> bool:
 def _choose(
     file: EsiFile, report: ImportReport, product_code: int | None, revision: int | None
 ) -> tuple[EsiDevice, tuple[EsiDevice, ...]]:
-    """The device to be read, and the others of the file.
+    """Return the device to be read, and the others of the file.
 
     Raises:
         ImportFailed: none has this product code.
@@ -117,7 +117,7 @@ def _choose(
         raise ImportFailed(
             "description.no-revision", file=file.name, revision=revision or 0, known=known
         )
-    # The newest revision of the right product is nearer than any other product.
+    # The newest revision of the right product is closer than any other product.
     chosen = _newest(matching or of_product)
     others = tuple(d for d in devices if d.number != chosen.number)
     if not matching:
@@ -133,14 +133,14 @@ def _choose(
 
 
 def _newest(devices: list[EsiDevice]) -> EsiDevice:
-    """The newest revision of the first product that has a control word, else of the first one."""
+    """Return the newest revision of the first product with a control word, else of the first."""
     drives = [d for d in devices if d.has_control_word] or devices
     same = [d for d in drives if d.product_code == drives[0].product_code]
     return max(same, key=lambda d: -1 if d.revision is None else d.revision)
 
 
 def _named(device: EsiDevice) -> str:
-    """The device with the names that its numbers have in the file, for any language."""
+    """Return the device with its numbers, under their names in the file, for any language."""
     product, revision = device.product_code or 0, device.revision or 0
     return f"{device.name} (ProductCode {product:#x}, RevisionNo {revision:#x})"
 
@@ -157,7 +157,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
         raise ImportFailed("description.profile-file-exists", path=str(target))
     text = profile_yaml(imported)
     target.parent.mkdir(parents=True, exist_ok=True)
-    # Whole or not at all: the loader would trip over half a profile at every start.
+    # Written completely or not at all: a partial profile would fail to load at every start.
     part = target.with_suffix(".part")
     try:
         part.write_text(text, "utf-8")
@@ -169,7 +169,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
 
 
 def profile_yaml(profile: Profile) -> str:
-    """The profile as YAML with one parameter per line group, defaults left out."""
+    """Return the profile as YAML with one parameter per line group, defaults left out."""
     data = profile.model_dump(
         mode="json", exclude_defaults=True, exclude={"parameters": {"__all__": set(CLASS_FIELDS)}}
     )

@@ -1,10 +1,10 @@
 """Imports in a process of their own, which the server starts with bounded memory.
 
-A maker's file may take seconds, and it is not known what is in it. Here it holds up no motion, and
-whoever started it can end it. One task comes pickled on the standard input, from our own parent
-only; one JSON object goes to the standard output: ``{"ok": …}``, ``{"refused": {"code": …,
-"params": …}}`` with a message of the catalogue, or ``{"error": "…"}`` in the words of the operating
-system.
+Importing a manufacturer's file may take seconds, and its contents are unknown. In this process it
+cannot delay a motion, and the caller can end it. One task comes pickled on the standard input, only
+from our own parent; one JSON object goes to the standard output: ``{"ok": …}``, ``{"refused":
+{"code": …, "params": …}}`` with a message of the catalogue, or ``{"error": "…"}`` in the words of
+the operating system.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from profiles.loader import ProfileError, drive_names, load_profile
 
 @dataclass(frozen=True, slots=True)
 class FileTask:
-    """Make a profile from a file and write it to ``folder``. ``name`` None: after the device."""
+    """Create a profile from a file and write it to ``folder``. ``name`` None: after the device."""
 
     data: bytes
     file: str
@@ -48,7 +48,7 @@ class FileTask:
 
 @dataclass(frozen=True, slots=True)
 class DescriptionTask:
-    """Make a profile called ``name`` from what a drive reported and write it to ``folder``."""
+    """Create a profile named ``name`` from a drive's report and write it to ``folder``."""
 
     description: Description
     report: ImportReport
@@ -62,13 +62,13 @@ class DescriptionTask:
 
 @dataclass(frozen=True, slots=True)
 class DevicesTask:
-    """Say which devices a file describes; an EDS or DCF file has one, which is not read here."""
+    """List the devices in a file; an EDS or DCF file has one, which is not read here."""
 
     data: bytes
     file: str
 
     def run(self) -> dict[str, object]:
-        """``devices``: name, product_code and revision of each; empty for an EDS file."""
+        """Return ``devices``: name, product_code and revision of each; empty for an EDS file."""
         if not is_xml(self.data):
             return {"devices": []}
         devices = esi_devices(open_esi(self.data, self.file, ImportReport()))
@@ -81,12 +81,12 @@ class DevicesTask:
 
 
 Task = FileTask | DescriptionTask | DevicesTask
-#: Bytes that are kept for the answer of a process which has used up its memory.
+#: Bytes reserved for the answer of a process that has used up its memory.
 _RESERVE = 16 << 20
 
 
 def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
-    """Write the profile and read it back the way everybody else will."""
+    """Write the profile and read it back through the loader."""
     profile, report = imported.profile, imported.report
     if profile.drive in drive_names():
         raise ImportFailed("description.profile-exists", name=profile.drive)
@@ -114,7 +114,7 @@ def _written(imported: ImportedProfile, folder: Path) -> dict[str, object]:
 
 
 def main(most_mib: int = 0) -> None:
-    """Carry out the one task of this process, whose memory has been bounded to ``most_mib``."""
+    """Execute the single task of this process, whose memory is limited to ``most_mib``."""
     answer: dict[str, object]
     reserve = [bytearray(_RESERVE)]
     try:

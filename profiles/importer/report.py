@@ -1,6 +1,6 @@
-"""What was odd about a description file: codes of the catalogue with their facts.
+"""Irregularities of a description file: codes of the catalogue with their facts.
 
-Words are made of them where they are shown (`drivers.texts.imports`).
+Words are generated where they are shown (`drivers.texts.imports`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 _KEPT = 500
-#: A reader of JSON rounds whole numbers beyond this.
+#: JSON readers round whole numbers beyond this.
 _EXACT = 2**53
 
 Fact: TypeAlias = str | int | float
@@ -18,7 +18,7 @@ Outcome: TypeAlias = Literal["repaired", "left out", "noted"]
 
 
 class ImportFailed(Exception):
-    """Nothing usable is in the file: a code of the catalogue and its facts state why."""
+    """The file contains nothing usable: a code of the catalogue and its facts state why."""
 
     def __init__(self, code: str, /, **params: Fact) -> None:
         super().__init__(code, params)
@@ -31,10 +31,10 @@ class ImportFailed(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One oddity: where, what, and what was made of it.
+    """One irregularity: its place, a message, and how it was handled.
 
-    ``place`` is a file with its line, section or element, in the spelling of the file; ``code``
-    and ``params`` are the message.
+    ``place`` is a file with its line, section or element, in the spelling of the file; ``code`` and
+    ``params`` are the message.
     """
 
     place: str
@@ -54,15 +54,15 @@ class ImportReport:
     not_listed: int = 0
 
     def repaired(self, place: str, code: str, /, **params: Fact) -> None:
-        """Something wrong whose meaning is clear."""
+        """Add an error with a clear meaning, which was corrected."""
         self._add(place, code, params, "repaired")
 
     def left_out(self, place: str, code: str, /, **params: Fact) -> None:
-        """Something that could not be understood and is missing from the profile."""
+        """Add something that could not be interpreted and is missing from the profile."""
         self._add(place, code, params, "left out")
 
     def noted(self, place: str, code: str, /, **params: Fact) -> None:
-        """Something that the user should know."""
+        """Add information for the user."""
         self._add(place, code, params, "noted")
 
     def _add(self, place: str, code: str, params: Mapping[str, Fact], outcome: Outcome) -> None:
@@ -73,7 +73,7 @@ class ImportReport:
 
 
 def _facts(params: Mapping[str, Fact]) -> dict[str, Fact]:
-    """Facts that JSON carries as they are."""
+    """Return facts in a form that JSON keeps exactly."""
     return {
         name: str(fact) if isinstance(fact, int) and abs(fact) > _EXACT else fact
         for name, fact in params.items()

@@ -1,4 +1,4 @@
-"""Bytes of a description file to text, whatever encoding its maker used."""
+"""Decoding of a description file to text, whatever encoding its author used."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DECLARED = re.compile(rb"^\s*<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]{1,
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 #: "äöüÄÖÜßéèêàâçñ°²" in code page 850: letters of Western languages, degrees and the square.
 _DOS_LETTERS = bytes.fromhex("8494818e999ae1828a88858387a4f8fd")
-#: By the names that Python gives them; a file may use any alias.
+#: Names of encodings in Python; a file may use any alias.
 _KNOWN_ENCODINGS = {
     "utf-8", "ascii", "utf-16", "utf-16-le", "utf-16-be", "gb2312", "gbk", "gb18030", "big5",
     "shift_jis", "cp932", "euc_jp", "euc_kr", "cp949", "iso8859-1", "iso8859-2", "iso8859-9",
@@ -25,7 +25,7 @@ _KNOWN_ENCODINGS = {
 
 
 def check_size(data: bytes, limit: int, name: str) -> None:
-    """Raises ImportFailed above ``limit`` bytes."""
+    """Raise ImportFailed above ``limit`` bytes."""
     if len(data) > limit:
         raise ImportFailed(
             "description.too-large", file=name, size_bytes=len(data), limit_mib=limit // 2**20
@@ -33,7 +33,7 @@ def check_size(data: bytes, limit: int, name: str) -> None:
 
 
 def decode_text(data: bytes, name: str, report: ImportReport) -> str:
-    """Text of a file without declared encoding (EDS)."""
+    """Return the text of a file without a declared encoding (EDS)."""
     for mark, encoding in _MARKS:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, "replace")
@@ -50,14 +50,14 @@ def decode_text(data: bytes, name: str, report: ImportReport) -> str:
 
 
 def _looks_chinese(data: bytes) -> bool:
-    """GB 2312 puts two bytes above A0h side by side; Western letters stand alone mostly."""
+    """Return whether it looks like GB 2312, which has pairs of bytes above A0h."""
     runs = re.findall(rb"[\x80-\xff]+", data[:100_000])
     pairs = sum(len(run) for run in runs if len(run) % 2 == 0 and min(run) > 0xA0)
     return pairs * 2 > sum(map(len, runs))
 
 
 def _by_editor(data: bytes) -> str:
-    """Windows has hardly a letter at 80h to 9Fh: DOS has umlauts there, Shift-JIS first bytes."""
+    """Return Windows, DOS or Shift-JIS encoding: 80h to 9Fh are rarely letters in Windows."""
     high = [byte for byte in data[:100_000] if byte >= 0x80]
     if sum(byte < 0xA0 for byte in high) * 2 < len(high):
         return "cp1252"
@@ -71,7 +71,7 @@ def _by_editor(data: bytes) -> str:
 
 
 def _python_name(encoding: str) -> str:
-    """The name of an encoding without its aliases; empty where nobody knows it."""
+    """Return the canonical name of an encoding; empty if unknown."""
     try:
         return codecs.lookup(encoding.replace("windows-936", "gbk")).name
     except LookupError:
@@ -79,9 +79,9 @@ def _python_name(encoding: str) -> str:
 
 
 def decode_xml(data: bytes, name: str, report: ImportReport) -> str:
-    """Text of an XML file without its declaration, so that the parser gets plain Unicode.
+    """Return the text of an XML file without its declaration, as plain Unicode for the parser.
 
-    The parser itself has no multi-byte encodings such as GB2312.
+    The parser itself does not support multi-byte encodings such as GB2312.
     """
     declared = _DECLARED.match(data[:400])
     if declared is None or data.startswith(tuple(mark for mark, _ in _MARKS)):

@@ -1,7 +1,7 @@
-"""Numbers, types and texts as makers write them. Pure.
+"""Numbers, types and texts in the notations of manufacturers. Pure.
 
-Each function takes what the files of many makers contain, not only what the standards allow:
-see ``docs/drives/not-listed.md`` for the list.
+Each function accepts what the files of many manufacturers contain, not only what the standards
+allow: see ``docs/drives/not-listed.md`` for the list.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ _UNITS = (
     "rev", "rpm/s", "r/s", "rps", "mr/s", "user unit", "units", "1/s", "0.1hz", "0.1rpm", "0.1ms",
     "0.01ms", "0.1a", "0.01a", "0.1v", "bit",
 )  # fmt: skip
-#: With or without a mark: eight bare digits are a code, never a unit's name.
+#: Code of a unit, with or without a prefix: eight bare digits are never a unit's name.
 _UNIT_CODE = re.compile(r"(?:#x|0x)([0-9a-fA-F]{1,8})|([0-9a-fA-F]{8})")
 _PREFIXES = {0: "", 3: "k", 6: "M", -2: "c", -3: "m", -6: "µ", -9: "n"}
-#: Units that take no prefix in use: 0.001 rev, not mrev.
+#: Units that are not used with prefixes: 0.001 rev, not mrev.
 _WITHOUT_PREFIX = frozenset({"rev", "rpm", "inc", "°", "min", "h", "s²", "s³", "°C"})
 _UNIT_CODES = {
     0x00: "", 0x01: "m", 0x02: "g", 0x03: "s", 0x04: "A", 0x05: "K", 0x10: "rad", 0x20: "Hz",
@@ -91,7 +91,7 @@ _REAL32_MAX = 3.4028234e38
 
 
 def parse_number(text: str, place: str, report: ImportReport) -> int | float | None:
-    """A number in any of the notations found, or None with a finding where it is none.
+    """Parse a number in any of the notations found; None with a finding if it is not a number.
 
     Empty text is None without a finding: many files leave defaults empty.
     """
@@ -150,7 +150,7 @@ def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | fl
 
 
 def node_relative(text: str, place: str, report: ImportReport) -> int | None:
-    """What is added to the node-ID in ``$NODEID+0x200``; None where the text does not name it."""
+    """Return the offset to the node-ID, as in ``$NODEID+0x200``; None if it is not in the text."""
     if not _NODE_ID.search(text):
         return None
     *before, last = _NODE_ID.split(text)
@@ -161,7 +161,7 @@ def node_relative(text: str, place: str, report: ImportReport) -> int | None:
 
 
 def whole_number(text: str, place: str, report: ImportReport) -> int | None:
-    """A whole number that is not negative, or None."""
+    """Return a non-negative whole number, or None."""
     number = parse_number(text, place, report)
     return None if number is None or number != int(number) or number < 0 else int(number)
 
@@ -169,13 +169,12 @@ def whole_number(text: str, place: str, report: ImportReport) -> int | None:
 def fit(
     value: int | float | None, data_type: DataType, name: str, place: str, report: ImportReport
 ) -> int | float | None:
-    """``value`` as a raw value of ``data_type``, or None with a finding.
+    """Convert ``value`` to a raw value of ``data_type``, or None with a finding.
 
-    ``name`` is that of the field in the file's format, such as ``MaxValue`` or ``HighLimit``.
-
-    A positive number above a signed type's maximum that fits its width is two's complement:
-    most makers write negative limits so. As a maximum, the number just above the type's own and
-    the greatest of the unsigned type mean "no limit", never a negative one.
+    ``name`` is the name of the field in the file's format, such as ``MaxValue`` or ``HighLimit``. A
+    positive number above a signed type's maximum that fits its width is two's complement: most
+    manufacturers write negative limits in this form. As a maximum, the number just above the type's
+    own and the greatest of the unsigned type mean "no limit", never a negative one.
     """
     if value is None or data_type in ("STRING", "OCTETS"):
         return None
@@ -216,9 +215,9 @@ def default_value(
     report: ImportReport,
     name: str = "DefaultValue",
 ) -> tuple[Raw | None, str]:
-    """A default and a remark: a default that depends on the node number has no fixed value.
+    """Return a default and a remark: a default that depends on the node number is not fixed.
 
-    ``name`` is that of the field in the file's format.
+    ``name`` is the name of the field in the file's format.
     """
     if _NODE_ID.search(text):
         return None, f"default {text.strip()[:60]}"
@@ -228,14 +227,14 @@ def default_value(
         return None, ""
     bits = _REAL_BITS.fullmatch(text.strip())
     if data_type == "REAL32" and bits is not None:
-        # Nobody writes a real number in hexadecimal: these are its bits.
+        # Real numbers are not written in hexadecimal: these are its bits.
         return real_of_bits(int(bits.group(1), 16)), ""
     number = parse_number(text, f"{place} {name}", report)
     return fit(number, data_type, name, place, report), ""
 
 
 def real_of_bits(bits: int) -> float | None:
-    """A REAL32 by the number that its four bytes make (IEEE 754); None where they make none."""
+    """Convert the number of four bytes to a REAL32 (IEEE 754); None if it is not finite."""
     if not 0 <= bits <= 0xFFFFFFFF:
         return None
     value: float = struct.unpack(">f", bits.to_bytes(4, "big"))[0]
@@ -243,7 +242,7 @@ def real_of_bits(bits: int) -> float | None:
 
 
 def named_type(name: str, bits: int | None) -> DataType | None:
-    """A data type by one of its names (``UDINT``, ``UNSIGNED32``, ``STRING(20)`` …)."""
+    """Return a data type by one of its names (``UDINT``, ``UNSIGNED32``, ``STRING(20)`` …)."""
     bare = name.strip().upper()
     bare = re.sub(r"\s*[(\[].*$", "", bare)
     found = _NAMED.get(bare)
@@ -259,7 +258,7 @@ def named_type(name: str, bits: int | None) -> DataType | None:
 
 
 def parse_access(text: str, place: str, report: ImportReport) -> Access:
-    """Access rights; what cannot be understood becomes read-only, the harmless choice."""
+    """Parse access rights; unknown ones become read-only, the harmless choice."""
     access = _ACCESS.get(text.strip().lower().replace(" ", "").replace("-", ""))
     if access is None:
         report.repaired(place, "description.access-unknown", access=text.strip())
@@ -268,7 +267,7 @@ def parse_access(text: str, place: str, report: ImportReport) -> Access:
 
 
 def unit_of_name(name: str) -> tuple[str, str]:
-    """Name and unit, where the name ends with a unit in brackets; else the name and empty."""
+    """Split name and unit if the name ends with a unit in brackets; else the name and ""."""
     match = _UNIT_IN_NAME.search(name)
     if match is None or match.group(1).strip().lower() not in _UNITS:
         return name, ""
@@ -276,7 +275,7 @@ def unit_of_name(name: str) -> tuple[str, str]:
 
 
 def unit_of_code(text: str) -> str:
-    """A unit from its number of CiA 303-2 (as ETG.1004 uses it), or empty where it is none.
+    """Return a unit from its number in CiA 303-2 (as used in ETG.1004), or "" if invalid.
 
     Bits 31-24 are the power of ten (signed), 23-16 the numerator, 15-8 the denominator.
     """
@@ -298,7 +297,7 @@ def unit_of_code(text: str) -> str:
 
 
 def tidy(text: str, longest: int = 200) -> str:
-    """One line without control characters, at most ``longest`` characters."""
+    """Return one line without control characters, at most ``longest`` characters."""
     plain = text.isprintable()
     cleaned = text if plain else "".join(c if c.isprintable() else " " for c in text)
     return " ".join(cleaned.split())[:longest]

@@ -1,4 +1,4 @@
-"""What makers' tools write that no XML parser takes, removed from an ESI file. Pure."""
+"""Removal of constructs from an ESI file that no XML parser accepts. Pure."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _PREFIXED = re.compile(r"(\s)(?!xmlns:)[A-Za-z_][\w.-]*:([A-Za-z_][\w.-]*\s*=\s*
 
 
 def mended(text: str) -> str:
-    """The text without remarks around its root, control characters and bare ampersands.
+    """Return the text without remarks around its root, control characters and bare ampersands.
 
-    A prefix that nobody declares is taken off its tag or attribute. What is cut off stays so.
+    An undeclared prefix is removed from its tag or attribute. A truncated file remains truncated.
     """
     begin = _BEGIN.search(text)
     if begin is not None:

@@ -1,17 +1,17 @@
-"""Small steps through an XML tree that take a missing element for an empty one."""
+"""Access to an XML tree that treats a missing element as an empty one."""
 
 from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-#: Windows' numbers for English: of the United States, and of none.
+#: Windows language number of English (United States); 9 is English without a country.
 _ENGLISH = "1033"
 
 
 def simplify_tags(root: Element) -> None:
-    """Take ``{namespace}`` off every tag, and capitals off every tag below the root.
+    """Remove ``{namespace}`` from every tag, and change tags below the root to lower case.
 
-    Makers use several namespaces or none, and write the same tag in other letters.
+    Manufacturers use several namespaces or none, and write the same tag in different case.
     """
     simple: dict[str, str] = {}
     for element in root.iter():
@@ -23,22 +23,22 @@ def simplify_tags(root: Element) -> None:
 
 
 def child(element: Element | None, tag: str) -> Element | None:
-    """The first child with this tag, whatever the case of its letters; see `simplify_tags`."""
+    """Return the first child with this tag, ignoring case; see `simplify_tags`."""
     return None if element is None else element.find(tag.lower())
 
 
 def children(element: Element | None, tag: str) -> list[Element]:
-    """All children with this tag, whatever the case of its letters."""
+    """Return all children with this tag, ignoring case."""
     return [] if element is None else element.findall(tag.lower())
 
 
 def text_of(element: Element | None) -> str:
-    """Its text without surrounding space."""
+    """Return its text without surrounding space."""
     return "" if element is None or element.text is None else element.text.strip()
 
 
 def name_of(element: Element | None) -> str:
-    """The English name where there are several, else the first."""
+    """Return the English name if there are several, else the first."""
     names = children(element, "Name")
     for name in names:
         if (name.get("LcId") or _ENGLISH).strip() in (_ENGLISH, "9"):
@@ -47,7 +47,7 @@ def name_of(element: Element | None) -> str:
 
 
 def attribute_of(element: Element | None, name: str) -> str:
-    """An attribute's value, whatever the case of its name; empty where it is missing."""
+    """Return an attribute's value, ignoring the case of its name; empty if missing."""
     if element is None:
         return ""
     lowered = {key.lower(): value for key, value in element.attrib.items()}
@@ -55,5 +55,5 @@ def attribute_of(element: Element | None, name: str) -> str:
 
 
 def flag_of(element: Element | None, name: str) -> bool:
-    """Whether an attribute says yes."""
+    """Return whether an attribute is true."""
     return attribute_of(element, name).strip().lower() in ("1", "true")

@@ -1,10 +1,10 @@
 """Reads the translated texts of a drive family: ``profiles/<drive>/<language>/*.yaml``.
 
-An overlay holds the texts of a profile in another language: by the key of the record that they
-belong to, or under ``common`` by the English text. What several families say alike, such as the
-objects of CiA 402, is translated once in ``profiles/language/<language>/*.yaml`` and holds for
-every family, the user's own among them; a family's own translation goes before it. What has no
-translation is left out: a reader then sees the English text, marked as not translated.
+An overlay contains the texts of a profile in another language: by the key of their record, or under
+``common`` by the English text. Texts common to several families, such as the objects of CiA 402,
+are translated once in ``profiles/language/<language>/*.yaml`` and apply to every family, including
+the user's own; a family's own translation takes precedence. A text without translation is left out:
+a reader then sees the English text, marked as not translated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 Language = Literal["zh"]
 LANGUAGES: tuple[Language, ...] = get_args(Language)
-#: Where a text stands: ``("faults", "0x2300", "causes", "0")``.
+#: Place of a text: ``("faults", "0x2300", "causes", "0")``.
 Place = tuple[str, ...]
 
 
@@ -39,7 +39,7 @@ class ParameterWords(Frozen):
 
 
 class FaultWords(Frozen):
-    """Translated texts of a fault; causes and remedies one for one in the profile's order."""
+    """Translated texts of a fault; causes and remedies one by one in the profile's order."""
 
     name: str = ""
     causes: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class NamedWords(Frozen):
 
 
 class FunctionWords(Frozen):
-    """Translated texts of a way of forcing, of a guide or of the drive's own identification."""
+    """Translated texts of forcing, of a guide, or of the drive's own identification."""
 
     title: str = ""
     help: str = ""
@@ -95,7 +95,7 @@ class Overlay(Frozen):
     )
 
     def placed(self) -> dict[Place, str]:
-        """Every translated text that belongs to one record, by its place."""
+        """Return every translated text that belongs to one record, by its place."""
         found = dict(_walk((), self.model_dump(exclude={"common", "shared"})))
         return {place: text for place, text in found.items() if text}
 
@@ -117,10 +117,10 @@ class _Version(NamedTuple):
 
 
 def load_overlay(drive: str, language: Language) -> Overlay:
-    """The translated texts of a family and those of all families.
+    """Load the translated texts of a family and those of all families.
 
     Raises:
-        ProfileError: broken YAML, or a key that the overlay does not know.
+        ProfileError: broken YAML, or an unknown key.
     """
     own = not (_PROFILES / drive / "profile.yaml").exists()
     folder = (user_folder() if own else _PROFILES) / drive / language
@@ -129,7 +129,7 @@ def load_overlay(drive: str, language: Language) -> Overlay:
 
 
 def load_shared(language: Language) -> dict[str, str]:
-    """English text to its translation, for what several families say alike.
+    """Map English text to its translation, for texts common to several families.
 
     Raises:
         ProfileError: broken YAML, or anything but common texts.
@@ -156,7 +156,7 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
     """Join YAML texts (file name to content) and check them.
 
     Raises:
-        ProfileError: with file name for broken YAML or a text given twice, with the place for an
+        ProfileError: with file name for broken YAML or a duplicate text, with the place for an
             unknown key.
     """
     merged: dict[str, Any] = {}

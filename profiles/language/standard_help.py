@@ -19,12 +19,12 @@ def _known() -> dict[str, str]:
 
 
 def with_standard_help(profile: Profile) -> Profile:
-    """The profile with the standard's help where its own has none."""
+    """Return the profile with the standard's help where its own has none."""
     known = _known()
     parameters = tuple(
         p.model_copy(update={"help": known[p.key]}) if not p.help and p.key in known else p
         for p in profile.parameters
     )
-    # Built again, not copied: a copy would keep the tables that the old one has worked out.
+    # Rebuilt, not copied: a copy would keep the cached tables of the old one.
     fields = {name: getattr(profile, name) for name in Profile.model_fields}
     return Profile.model_construct(profile.model_fields_set, **{**fields, "parameters": parameters})

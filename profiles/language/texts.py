@@ -12,8 +12,8 @@ from profiles.functions import Functions
 from profiles.language.overlay import Overlay, Place
 from profiles.schema import ConfirmStep, Fault, Parameter, Procedure, Profile
 
-#: ``safety``: warnings and the texts that a person must agree to before anything moves.
-#: ``pages``: what the pages of gains, motion, mechanics, I/O and alarms say of the family.
+#: ``safety``: warnings and the texts that a person must confirm before anything moves. ``pages``:
+#: texts on the family in the pages of gains, motion, mechanics, I/O and alarms.
 Kind = Literal[
     "safety", "faults", "procedures", "homing", "terminals", "groups", "parameter names",
     "parameter help", "parameter notes", "values", "pages", "notes on the drive",
@@ -22,8 +22,7 @@ Kind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text of the profile in English. Texts of terminals and groups have no place: records
-    share them."""
+    """A text of the profile in English. Terminals and groups have no place: records share them."""
 
     kind: Kind
     place: Place
@@ -31,7 +30,7 @@ class Text:
 
 
 def texts_of(profile: Profile) -> Iterator[Text]:
-    """Every text of a profile that can be translated; empty ones are left out."""
+    """Iterate over every text of a profile that can be translated; empty ones are left out."""
     for text in _all(profile):
         if text.english.strip():
             yield text
@@ -110,7 +109,7 @@ def _of_functions(profile: Profile) -> Iterator[Text]:
 
 
 def _page_texts(functions: Functions) -> Iterator[str]:
-    """Titles, help and notes of the pages, by their English text alone."""
+    """Iterate over titles, help and notes of the pages, by their English text alone."""
     for group in functions.groups:
         yield from (group.title, group.help)
     for block in functions.gain_blocks:
@@ -144,7 +143,7 @@ def _of_parameter(parameter: Parameter) -> Iterator[Text]:
 
 
 def translation(text: Text, overlay: Overlay, placed: dict[Place, str]) -> str | None:
-    """The translation of one text: the record's, the family's, that of all families, or None."""
+    """Return the translation of one text: the record's, the family's, that of all, or None."""
     return (
         placed.get(text.place)
         or overlay.common.get(text.english)
@@ -153,10 +152,10 @@ def translation(text: Text, overlay: Overlay, placed: dict[Place, str]) -> str |
 
 
 def translations(profile: Profile, overlay: Overlay) -> dict[str, str]:
-    """English text to its translation, for everything that is translated.
+    """Map English text to its translation, for everything that is translated.
 
-    By the English text, so that a text that was corrected since is shown in English rather than
-    with the translation of what it said before.
+    By the English text, so that a text corrected later is shown in English rather than with the
+    translation of its old version.
     """
     placed = overlay.placed()
     found: dict[str, str] = {}
@@ -168,7 +167,7 @@ def translations(profile: Profile, overlay: Overlay) -> dict[str, str]:
 
 
 def untranslated(profile: Profile, overlay: Overlay, *kinds: Kind) -> list[Text]:
-    """Texts of these kinds (all where none is given) without a translation."""
+    """Return the texts of these kinds (default: all) without a translation."""
     placed = overlay.placed()
     return [
         text
@@ -178,7 +177,7 @@ def untranslated(profile: Profile, overlay: Overlay, *kinds: Kind) -> list[Text]
 
 
 def check_overlay(profile: Profile, overlay: Overlay) -> list[Finding]:
-    """Texts of something that no longer exists, and English texts with two translations."""
+    """Find texts of records that no longer exist, and English texts with two translations."""
     texts = list(texts_of(profile))
     placed = overlay.placed()
     places = {text.place for text in texts}
@@ -204,7 +203,7 @@ def check_overlay(profile: Profile, overlay: Overlay) -> list[Finding]:
 
 
 def overlay_coverage(profile: Profile, overlay: Overlay) -> list[str]:
-    """A line per kind of text: how many of how many are translated."""
+    """Return a line per kind of text: how many of how many are translated."""
     every = Counter(text.kind for text in texts_of(profile))
     missing = Counter(text.kind for text in untranslated(profile, overlay))
     return [f"{kind} {count - missing[kind]} of {count}" for kind, count in every.items()]

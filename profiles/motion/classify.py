@@ -1,8 +1,8 @@
 """Motion classes of a profile's parameters.
 
-The first of these that covers a writable object gives its class: the profile's rules in their
-order (a person's rules stand before the profile's own), then the table of the standard objects.
-An object that none of them covers counts as ``energises``: what nobody knows may move the axis.
+The first of these that covers a writable object determines its class: the profile's rules in their
+order (a person's rules precede the profile's own), then the table of the standard objects. An
+object that none of them covers counts as ``energises``: an unknown object may move the axis.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from profiles.schema import Parameter, Profile
 
 STANDARD_FILE = Path(__file__).with_name("standard.yaml")
 
-#: CiA 402 gives each further axis of one device its objects 800h behind the axis before
+#: CiA 402 places the objects of each further axis of one device 800h after those of the axis before
 #: (CiA 402-1 clause 7.1; ETG.6010 clause 5.1): 6000h–67FFh, 6800h–6FFFh … up to 9FFFh.
 _AXES = range(0x6000, 0xA000)
 _AXIS_STEP = 0x800
@@ -29,13 +29,13 @@ _UNCLASSIFIED = "nobody has said yet what writing it does"
 
 @cache
 def standard_rules() -> tuple[MotionRule, ...]:
-    """The table of the objects of CiA 301, CiA 402 and ETG.1000.6."""
+    """Return the table of the objects of CiA 301, CiA 402 and ETG.1000.6."""
     data = yaml.safe_load(STANDARD_FILE.read_text("utf-8"))
     return TypeAdapter(tuple[MotionRule, ...]).validate_python(data["motion_rules"])
 
 
 def standard_rule(key: str) -> MotionRule | None:
-    """The standard's rule for a key of any axis of a device, or None for a maker's object."""
+    """Return the standard's rule for a key of any axis, or None for a manufacturer's object."""
     if key.startswith("PA_"):
         return None
     index = int(key[:4], 16)
@@ -47,9 +47,9 @@ def standard_rule(key: str) -> MotionRule | None:
 
 
 def classified(profile: Profile) -> Profile:
-    """The profile with the motion class of every writable object."""
+    """Return the profile with the motion class of every writable object."""
     parameters = tuple(_classified(profile, p) for p in profile.parameters)
-    # Built again, not copied: a copy would keep the tables that the old one has worked out.
+    # Rebuilt, not copied: a copy would keep the cached tables of the old one.
     fields = {name: getattr(profile, name) for name in Profile.model_fields}
     return Profile.model_construct(profile.model_fields_set, **{**fields, "parameters": parameters})
 

@@ -1,9 +1,9 @@
-"""Motion classes that a person of a station gives to objects of an imported profile.
+"""Motion classes that a person of a station assigns to objects of an imported profile.
 
-They are kept as rules in ``motion.yaml`` next to the imported ``profile.yaml``. The loader joins
-files in name order and the first rule counts, so a person's word stands before everything else.
-Profiles that come with servodeck have their classes from a manual, standard objects from the
-standard: those nobody changes here.
+They are stored as rules in ``motion.yaml`` next to the imported ``profile.yaml``. The loader joins
+files in name order and the first rule counts, so a person's rules precede all others. Profiles that
+come with servodeck have their classes from a manual, standard objects from the standard: those
+cannot be changed here.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MAX_REASON = 500
 
 
 class CannotClassify(Exception):
-    """The class of this object is not a person's to give.
+    """A person cannot assign the class of this object.
 
     ``code`` of the catalogue states the reason, with its facts as ``params``.
     """
@@ -35,9 +35,9 @@ class CannotClassify(Exception):
 
 
 def why_fixed(profile: Profile, parameter: Parameter) -> str | None:
-    """Why a person cannot change the motion class of this object, as a code of the catalogue.
+    """Return why a person cannot change the motion class of this object, as a catalogue code.
 
-    None where it is possible.
+    None if it is possible.
     """
     if parameter.access == "ro":
         return "motion.class-not-writable"
@@ -55,10 +55,10 @@ def why_fixed(profile: Profile, parameter: Parameter) -> str | None:
 def classify(
     drive: str, key: str, motion: Motion, *, reason: str, safe_in_motion: bool = False
 ) -> Parameter:
-    """Give one object of an imported profile a motion class; returns it as it now is.
+    """Assign a motion class to one object of an imported profile; return its new state.
 
     Raises:
-        CannotClassify: not an object whose class a person may give, or no reason.
+        CannotClassify: the class of this object cannot be assigned, or there is no reason.
         ProfileError: no such profile, or it cannot be read.
         ValueError: ``safe_in_motion`` for another class than ``at_enable``.
         OSError: the profile's folder cannot be written.
@@ -79,7 +79,7 @@ def classify(
 
 
 def forget(drive: str, key: str) -> Parameter:
-    """Take a person's class back: the object counts as ``energises`` again.
+    """Remove a person's class: the object counts as ``energises`` again.
 
     Raises:
         CannotClassify, ProfileError, OSError: as `classify`.
@@ -102,13 +102,13 @@ def _changeable(drive: str, key: str) -> Parameter:
 
 
 def _without(drive: str, key: str) -> tuple[MotionRule, ...]:
-    """A person's rules of this profile, without that of one object."""
+    """Return a person's rules of this profile, without that of one object."""
     rules = (rule for rule in load_profile(drive).motion_rules if rule.origin == "person")
     return tuple(rule for rule in rules if rule.keys != (key,))
 
 
 def _write(drive: str, rules: tuple[MotionRule, ...]) -> None:
-    """Whole or not at all: half a file would take the classes of all objects away."""
+    """Write completely or not at all: a partial file would remove the classes of all objects."""
     path: Path = user_folder() / drive / FILE_NAME
     if not rules:
         path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""One rule that gives a motion class to a group of objects."""
+"""One rule that assigns a motion class to a group of objects."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from pydantic import Field, field_validator, model_validator
 from profiles.record import Frozen
 
 #: ``none``: cannot cause or change motion. ``at_enable``: changes how the axis moves or reacts
-#: (limits, gains, units, option codes), so it is written while the axis is disabled.
-#: ``energises``: can put energy into the motor or release the brake; the motion authority only.
+#: (limits, gains, units, option codes), so it is written while the axis is disabled. ``energises``:
+#: can energise the motor or release the brake; the motion authority only.
 Motion = Literal["none", "at_enable", "energises"]
-#: Who gave the class: the standard's table, the profile's own data, a person of this station,
-#: or nobody (then it counts as ``energises``).
+#: Origin of the class: the standard's table, the profile's own data, a person of this station, or
+#: none (then it counts as ``energises``).
 MotionOrigin = Literal["standard", "profile", "person", "unclassified"]
 
 _RANGE = re.compile(
     r"(?P<first>[0-9A-F]{4})(:(?P<sub>[0-9A-F]{2}))?(-(?P<last>[0-9A-F]{4})(:(?P<last_sub>[0-9A-F]{2}))?)?"
 )
 _OWN_NUMBERS = re.compile(r"PA_(?P<first>[0-9A-F]+)(-PA_(?P<last>[0-9A-F]+))?")
-#: Keys without an object index sort behind every object.
+#: Keys without an object index sort after every object.
 _BEHIND_OBJECTS = 1 << 32
 
 
 def place_of(key: str) -> int:
-    """Where a parameter key lies: index and subindex as one number, maker's numbers behind."""
+    """Return the place of a parameter key as one number: index and subindex, own numbers last."""
     if key.startswith("PA_"):
         return _BEHIND_OBJECTS + int(key[3:], 16)
     return int(key[:4], 16) << 8 | int(key[5:], 16)
 
 
 def span_of(text: str) -> tuple[int, int]:
-    """First and last place of a key (``2003:02``), object (``2003``) or inclusive range.
+    """Return first and last place of a key (``2003:02``), object (``2003``) or inclusive range.
 
     Raises:
         ValueError: the text is neither, or the range runs backwards.
@@ -87,6 +87,6 @@ class MotionRule(Frozen):
         return tuple(span_of(key) for key in self.keys)
 
     def covers(self, key: str) -> bool:
-        """Whether the rule is about this parameter key."""
+        """Return whether the rule applies to this parameter key."""
         place = place_of(key)
         return any(first <= place <= last for first, last in self.spans)

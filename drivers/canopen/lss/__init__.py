@@ -1,1 +1,1 @@
-"""Layer setting services (CiA 305): node numbers and bit rates of nodes that have none yet."""
+"""Layer setting services (CiA 305): set node numbers and bit rates of nodes without them."""

@@ -1,4 +1,4 @@
-"""The layer setting services of a CANopen bus in the server."""
+"""The layer setting services of a CANopen bus, in the server."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ InWorker = Callable[[Callable[[], Any]], Awaitable[Any]]
 
 @dataclass(frozen=True, slots=True)
 class LssNode:
-    """A node that was found; ``node`` is None where it has no node-ID."""
+    """A node that was found; ``node`` is None if it has no node-ID."""
 
     identity: LssIdentity
     node: int | None
 
 
 class LssAccess:
-    """Services of one bus. ``taken`` shows whether a node answers for a number."""
+    """Services of one bus. ``taken`` returns whether a node answers under a number."""
 
     def __init__(
         self,
@@ -40,12 +40,12 @@ class LssAccess:
         self._exchanging = exchanging
 
     async def search(self, progress: Progress) -> LssNode | None:
-        """A node without node-ID, else the only node with these services, if there is one.
+        """Find a node without node-ID, else the only node with these services, if there is one.
 
         Raises:
-            Busy: the cyclic exchange runs: a node that is being set leaves it.
-            NotAllowed: several nodes have node-IDs and these services; ask one by its identity.
-            LinkTimeout: a node answers in part only.
+            Busy: the cyclic exchange runs: a node being configured leaves it.
+            NotAllowed: several nodes have node-IDs and these services; select one by its identity.
+            LinkTimeout: a node answers only in part.
         """
         self._require_calm()
 
@@ -60,11 +60,11 @@ class LssAccess:
         return None if only is None else LssNode(*only)
 
     async def set_node(self, identity: LssIdentity, node: int, *, store: bool) -> None:
-        """Give a node its node-ID; see `LssMaster.set_node`.
+        """Set the node-ID of a node; see `LssMaster.set_node`.
 
         Raises:
             Busy: the cyclic exchange runs.
-            NotAllowed: another node answers for this number.
+            NotAllowed: another node answers under this number.
         """
         self._require_calm()
         if 1 <= node <= 127 and await self._taken(node):

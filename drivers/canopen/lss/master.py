@@ -1,6 +1,6 @@
-"""The master's side of the layer setting services, for a worker thread.
+"""Master side of the layer setting services, for a worker thread.
 
-Each service leaves all slaves waiting again. Source: CiA 305 v3.0.
+Each service leaves all slaves in the waiting state. Source: CiA 305 v3.0.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from drivers.canopen.lss.codes import LssIdentity
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange
 
 _ANSWER_S = 0.1
-"""CiA 305 leaves it open; slaves answer within some ms, and each bit of a scan takes as long."""
+"""Time-out [s], not set by CiA 305; slaves take some ms, and each bit of a scan one such time."""
 _LATE_ANSWER_S = 0.5
-"""For a scan that lost its node: an adapter or a computer that is late answers within this time."""
+"""Time-out [s] for a scan that lost its node: covers delays in an adapter or a computer."""
 _STORE_S = 2.0
 _OUT_OF_RANGE, _NOT_SUPPORTED = 1, 1
 _PARTS = 4
 
 
 class LssMaster:
-    """One master on one bus; ``send`` puts a frame with the master's identifier on it."""
+    """One master on one bus; ``send`` sends a frame with the master's identifier."""
 
     def __init__(
         self,
@@ -39,12 +39,12 @@ class LssMaster:
         self._turn = threading.Lock()
 
     def deliver(self, data: bytes) -> None:
-        """A frame with the slaves' identifier; called on the receiving thread."""
+        """Take a frame with the slaves' identifier (called on the receiving thread)."""
         if len(data) == 8:
             self._answers.put(data)
 
     def unconfigured(self) -> bool:
-        """Whether at least one node without node-ID is on the bus.
+        """Return whether at least one node without node-ID is on the bus.
 
         Raises:
             LinkLost: the adapter is gone.
@@ -55,19 +55,19 @@ class LssMaster:
             return bool(self._ask(request, codes.UNCONFIGURED))
 
     def find(self, progress: Callable[[float], None]) -> LssIdentity | None:
-        """The identity of one node without node-ID, bit by bit; None where there is none.
+        """Find the identity of one node without node-ID, bit by bit; None if there is none.
 
-        Of several nodes the one whose numbers are smallest is found.
+        Of several nodes the one with the smallest numbers is found.
 
         Raises:
-            LinkTimeout: a node answered and then not any more, or does not know fast scan.
+            LinkTimeout: a node stopped answering, or does not support fast scan.
             LinkLost: the adapter is gone.
         """
         with self._turn:
             try:
                 return self._scan(progress, self._answer_s)
             except LinkTimeout:
-                # No answer is a bit of the number: one that came late made it a wrong number.
+                # A missing answer is a bit of the number: a late answer resulted in a wrong number.
                 return self._scan(progress, self._late_answer_s)
 
     def _scan(self, progress: Callable[[float], None], answer_s: float) -> LssIdentity | None:
@@ -93,11 +93,11 @@ class LssMaster:
         return LssIdentity(*parts)
 
     def only_node(self) -> tuple[LssIdentity, int | None] | None:
-        """Identity and node-ID of the only node with these services; None where there is none.
+        """Return identity and node-ID of the only node with these services; None if there is none.
 
         Raises:
             NotAllowed: several answer.
-            LinkTimeout: it answers in part only.
+            LinkTimeout: it answers only in part.
         """
         with self._turn:
             self._send(codes.frame(codes.SWITCH_ALL, codes.CONFIGURATION))
@@ -123,7 +123,7 @@ class LssMaster:
         return LssIdentity(*found), known
 
     def set_node(self, identity: LssIdentity, node: int, *, store: bool) -> None:
-        """Give a node its node-ID; one that had none starts with it at once.
+        """Set the node-ID of a node; a node without one uses it at once.
 
         Raises:
             OutOfRange: not 1 to 127, or the node refuses the number.
@@ -144,11 +144,11 @@ class LssMaster:
                 self._wait_all()
 
     def set_bit_rate(self, identity: LssIdentity, kbit: int, *, store: bool) -> None:
-        """Set a node's bit rate [kbit/s]; it counts after the node was switched off and on.
+        """Set a node's bit rate [kbit/s]; it takes effect after a power cycle of the node.
 
         Raises:
-            OutOfRange: no bit rate of CiA 305, or not one that the node has.
-            NotAllowed: the node has its bit rate by other means, or cannot store it.
+            OutOfRange: not a bit rate of CiA 305, or not supported by the node.
+            NotAllowed: the node cannot store it.
             LinkTimeout: no node with this identity answers.
         """
         index = codes.BIT_RATES_KBIT.get(kbit)
@@ -197,7 +197,7 @@ class LssMaster:
         everybody: bool = False,
         within_s: float | None = None,
     ) -> list[bytes]:
-        """Answers with this command; with ``everybody`` all that come in the time."""
+        """Return the answers with this command; with ``everybody`` all that arrive in time."""
         while not self._answers.empty():
             self._answers.get()
         self._send(request)

@@ -1,1 +1,1 @@
-"""The EEPROM of a slave as a whole: read, check, compare, plan a change, write and read back."""
+"""The whole EEPROM of a slave: read, check, compare, plan a change, write and read back."""

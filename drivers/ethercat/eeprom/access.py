@@ -1,4 +1,4 @@
-"""The EEPROM of a station in the server: read, plan, carry out. The wire is the host's."""
+"""Server side of EEPROM access: read, plan and carry out. The host process owns the wire."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ from drivers.link import Address, Progress
 _READ_S, _WRITE_S = 120.0, 600.0
 _IDENTITY = 0x1018
 
-#: A message to the host with its time-out [s] and progress.
+#: Sends a message to the host, with its time-out [s] and progress.
 Call = Callable[[dict[str, Any], float, Progress | None], Awaitable[Any]]
 ReadObject = Callable[[int, Address], Awaitable[bytes]]
 
 
 class EepromAccess:
-    """EEPROMs of one segment."""
+    """Access to the EEPROMs of one segment."""
 
     def __init__(self, call: Call, read_object: ReadObject) -> None:
         self._call = call
         self._read_object = read_object
 
     async def read(self, station: int, progress: Progress, size: int | None = None) -> Image:
-        """The contents; ``size`` [bytes] where a damaged EEPROM does not state its own.
+        """Read the contents; ``size`` [bytes] for a damaged EEPROM that does not state its own.
 
         Raises:
             Busy: the cyclic exchange runs, or an EEPROM of the segment is being written.
-            ProtocolError: it states a size that no EEPROM has.
+            ProtocolError: the EEPROM states an impossible size.
         """
         message = {"op": "eeprom_read", "station": station, "size": size}
         return Image(await self._call(message, _READ_S, progress))
 
     async def identity(self, station: int) -> SlaveIdentity | None:
-        """What the drive's firmware says of itself (1018h); None where it does not answer."""
+        """Return the identity that the drive's firmware reports (1018h); None without an answer."""
         try:
             parts = [
                 int.from_bytes(
@@ -51,23 +51,24 @@ class EepromAccess:
     async def plan_restore(
         self, station: int, saved: bytes, progress: Progress, *, unknown_accepted: bool = False
     ) -> Plan:
-        """What restoring a saved file would change; errors as `plan.plan_restore` and `read`."""
+        """Plan the restoration of a saved file; errors as `plan.plan_restore` and `read`."""
         drive = await self.identity(station)
         present = await self.read(station, progress, _readable(saved))
         return plan_restore(present, Image(saved), drive, unknown_accepted=unknown_accepted)
 
     async def plan_identity(self, station: int, progress: Progress) -> Plan:
-        """What repairing the identity would change; errors as `plan.plan_identity` and `read`."""
+        """Plan the repair of the identity; errors as `plan.plan_identity` and `read`."""
         return plan_identity(await self.read(station, progress), await self.identity(station))
 
     async def carry_out(self, station: int, plan: Plan, digest: str, progress: Progress) -> None:
-        """Write what was planned, word by word, and read everything back.
+        """Write the planned change word by word, and read everything back.
 
         Raises:
             NotAllowed: ``digest`` is of another plan; the drive is in Safe-Op or Op, or its
-                processor plays the EEPROM.
-            ProtocolError: something else reads back.
-            LinkTimeout, LinkLost: it broke off; the checksum is wrong until it is restored.
+                processor emulates the EEPROM.
+            ProtocolError: the contents read back differ.
+            LinkTimeout, LinkLost: the writing broke off; the checksum is wrong until it is
+            restored.
         """
         if digest != plan.digest:
             raise NotAllowed("ethercat.eeprom-plan-changed", digest=plan.digest)
@@ -81,5 +82,5 @@ class EepromAccess:
 
 
 def _readable(saved: bytes) -> int:
-    """As much as the file has, and a header at the least: for the contents next to it."""
+    """Return the size of the file in whole units, at least one header, for reading the contents."""
     return max(len(saved) // 128 * 128, 128)

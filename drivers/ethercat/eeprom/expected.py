@@ -1,4 +1,4 @@
-"""What a maker's file says of the EEPROM, against what is in it. Pure.
+"""Comparison of the EEPROM contents with the manufacturer's file. Pure.
 
 Source: ETG.2000 clause 6.10 (Eeprom), ETG.2010 (words).
 """
@@ -16,9 +16,10 @@ _SYNC_MANAGERS = next(kind for kind, name in CATEGORIES.items() if name == "sync
 
 
 def against_profile(image: Image, profile: Profile) -> tuple[Difference, ...]:
-    """Fields in which the contents differ from the file: the file's value is ``second``.
+    """Return the fields in which the contents differ from the file: the file's value is ``second``.
 
-    What the file does not say is not compared; the alias belongs to the machine.
+    Fields that the file does not state are not compared, nor is the alias, which belongs to the
+    machine.
     """
     wanted: list[tuple[str, int, bytes]] = []
     for name, word, value in (
@@ -57,7 +58,7 @@ def _of_rules(rules: BringUp) -> list[tuple[str, int, bytes]]:
 
 
 def _of_managers(image: Image, rules: BringUp) -> list[Difference]:
-    """Start and control byte of each sync manager of the file."""
+    """Compare start and control byte of each sync manager in the file."""
     try:
         held = next((c for c in image.categories() if c.kind == _SYNC_MANAGERS), None)
     except ValueError:

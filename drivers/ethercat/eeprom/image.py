@@ -1,4 +1,4 @@
-"""The EEPROM of a slave as bytes: what it says, whether it is sound, how two of them differ.
+"""The EEPROM of a slave as bytes: its fields, its consistency, and differences of two images.
 
 Pure. Source: ETG.1000.6 clause 5.4 and ETG.2010 (words, categories, checksum).
 """
@@ -14,7 +14,7 @@ from drivers.ethercat.wire.sii import ALIAS_WORD, CHECKSUM_WORD, CONFIG_WORDS, c
 from drivers.texts.message import Text, text
 
 HEADER_BYTES, UNIT_BYTES = 0x80, 0x80
-"""What every EEPROM has before its categories, and the unit in which it states its size."""
+"""Length of the header before the categories, and the unit in which the size is stated."""
 MOST_BYTES = 1 << 20
 VENDOR_WORD, SERIAL_WORD, SIZE_WORD = 0x08, 0x0E, 0x3E
 _END = 0xFFFF
@@ -38,7 +38,7 @@ CATEGORIES = {
 
 
 class SlaveIdentity(NamedTuple):
-    """What a drive is: 1018h:01 to 1018h:03."""
+    """Identity of a drive: 1018h:01 to 1018h:03."""
 
     vendor_id: int
     product_code: int
@@ -55,7 +55,7 @@ class Category(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A field in which two contents differ; None where one of them has it not.
+    """A field in which two images differ; a value is None where that image lacks the field.
 
     ``field`` is a name of `FIELDS` or `CATEGORIES`, or "category N".
     """
@@ -73,12 +73,12 @@ class Image:
     data: bytes
 
     def part(self, word: int, count: int) -> bytes:
-        """Bytes of ``count`` words."""
+        """Return the bytes of ``count`` words."""
         return self.data[2 * word : 2 * (word + count)]
 
     @property
     def checksum_right(self) -> bool:
-        """Whether word 7 fits the words before it; a controller ignores the contents if not."""
+        """Whether word 7 matches the words before it; otherwise the ESC ignores the contents."""
         head = self.part(0, CONFIG_WORDS + 1)
         return len(head) == 16 and head[14] == checksum(head)
 
@@ -94,7 +94,7 @@ class Image:
 
     @property
     def serial(self) -> int | None:
-        """The serial number; None where there is none."""
+        """The serial number; None if there is none."""
         (serial,) = struct.unpack("<I", self.part(SERIAL_WORD, 2))
         return None if serial in (0, _BLANK) else int(serial)
 
@@ -105,19 +105,19 @@ class Image:
 
     @property
     def stated_bytes(self) -> int:
-        """The size that it states for itself."""
+        """Size in bytes that the EEPROM states."""
         return UNIT_BYTES * (int.from_bytes(self.part(SIZE_WORD, 1), "little") + 1)
 
     @property
     def trusted(self) -> bool:
-        """Whether what it says of the drive can be trusted."""
+        """Whether the identity of the drive in it can be trusted."""
         return self.checksum_right and self.has_identity
 
     def categories(self) -> Iterator[Category]:
-        """Its categories up to the end mark.
+        """Iterate over the categories up to the end mark.
 
         Raises:
-            ValueError: one goes beyond the end of the contents, or no end mark comes.
+            ValueError: a category exceeds the contents, or there is no end mark.
         """
         word = HEADER_BYTES // 2
         while True:
@@ -134,7 +134,7 @@ class Image:
             word += 2 + count
 
     def problem(self) -> Text | None:
-        """Why it cannot be the whole contents of a slave's EEPROM; None where it can."""
+        """Return why this cannot be the complete contents of a slave's EEPROM; None if it can."""
         size = len(self.data)
         if size < HEADER_BYTES or size % UNIT_BYTES or size > MOST_BYTES:
             return text("ethercat.eeprom-no-image", bytes=size)
@@ -151,7 +151,7 @@ class Image:
         return None
 
     def with_words(self, word: int, data: bytes) -> Image:
-        """With other bytes from a word on; the checksum is made to fit."""
+        """Return an image with other bytes from a word on, and a matching checksum."""
         changed = bytearray(self.data)
         changed[2 * word : 2 * word + len(data)] = data
         changed[2 * CHECKSUM_WORD] = checksum(bytes(changed))
@@ -159,7 +159,7 @@ class Image:
 
 
 def differences(first: Image, second: Image) -> tuple[Difference, ...]:
-    """Fields and categories in which two contents differ, in the order of their words."""
+    """Return the fields and categories in which two images differ, in the order of their words."""
     found = [
         Difference(name, word, before.hex(), after.hex())
         for name, word, count in FIELDS
@@ -194,7 +194,7 @@ def _of_categories(first: Image, second: Image) -> tuple[Difference, ...]:
 
 
 def _of_the_rest(first: Image, second: Image) -> tuple[Difference, ...]:
-    """What lies behind the header, as one; also where only what follows the end mark differs."""
+    """Compare everything behind the header as one field, including data after the end mark."""
     before, after = first.data[HEADER_BYTES:], second.data[HEADER_BYTES:]
     if before == after:
         return ()

@@ -1,7 +1,7 @@
-"""What is to be written into an EEPROM, and why it may be. Pure.
+"""Planned changes of an EEPROM, and the conditions under which they are allowed. Pure.
 
-A change is planned, shown, and carried out only for the digest of the plan that was shown: what
-changed in between, the drive or the file, is noticed.
+A change is planned, shown, and carried out only with the digest of the plan that was shown, so that
+a change of the drive or the file in between is detected.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from drivers.texts import limits
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """From the present contents to others. ``changes`` is empty where they are the same."""
+    """A change from the present contents to a target. ``changes`` is empty if both are equal."""
 
     present: Image
     target: Image
@@ -32,18 +32,18 @@ class Plan:
 
     @property
     def changes(self) -> tuple[Difference, ...]:
-        """What will be different."""
+        """The fields that will change."""
         return differences(self.present, self.target)
 
     @property
     def words(self) -> int:
-        """How many words are written."""
+        """Number of words that will be written."""
         before, after = self.present.data, self.target.data
         return sum(before[at : at + 2] != after[at : at + 2] for at in range(0, len(after), 2))
 
     @property
     def digest(self) -> str:
-        """Names this change: from these contents to those."""
+        """Identifies this change, from these contents to those."""
         both = hashlib.sha256(self.present.data)
         both.update(self.target.data)
         return both.hexdigest()[:16]
@@ -52,15 +52,15 @@ class Plan:
 def plan_restore(
     present: Image, saved: Image, drive: SlaveIdentity | None, *, unknown_accepted: bool = False
 ) -> Plan:
-    """From a saved file. ``drive`` is what the drive's firmware says of itself (1018h).
+    """Plan the restoration of a saved file. ``drive`` is the firmware's identity (1018h).
 
-    The serial number of the drive stays where it has one that can be trusted: two drives with
-    one serial number could not be distinguished.
+    The serial number of the drive is kept if it can be trusted: two drives with the same serial
+    number could not be distinguished.
 
     Raises:
-        OutOfRange: the file is no sound contents of an EEPROM, or of another size.
-        NotAllowed: it is of another drive; or nobody can say what the drive is, and
-            ``unknown_accepted`` is not given.
+        OutOfRange: the file is not a valid EEPROM image, or has another size.
+        NotAllowed: the file is of another drive; or the identity of the drive is unknown, and
+            ``unknown_accepted`` is not set.
     """
     problem = saved.problem()
     if problem is not None:
@@ -87,10 +87,10 @@ def plan_restore(
 
 
 def plan_identity(present: Image, drive: SlaveIdentity | None) -> Plan:
-    """Vendor, product and revision as the drive's firmware gives them (1018h).
+    """Plan to write vendor, product and revision as the firmware reports them (1018h).
 
     Raises:
-        NotAllowed: the drive does not say what it is, or the contents are damaged beyond that.
+        NotAllowed: the drive does not report its identity, or more than the identity is damaged.
     """
     if drive is None:
         raise NotAllowed("ethercat.eeprom-drive-silent")

@@ -1,8 +1,7 @@
 """Reading and writing a whole EEPROM, word by word, as steps without I/O.
 
-A change begins by making the checksum wrong and ends by making it right: a supply that fails in
-between leaves contents that the controller ignores and everybody notices, and which the saved
-file repairs.
+A change begins by making the checksum wrong and ends by making it right. A power failure in between
+leaves contents that the ESC ignores, that any check detects, and that the saved file repairs.
 """
 
 from __future__ import annotations
@@ -22,10 +21,10 @@ _PART_WORDS = 64
 
 
 def read_image(clock: Callable[[], float], report: Report, size: int | None = None) -> Steps[bytes]:
-    """Everything; ``size`` [bytes] where the contents cannot be trusted to state it.
+    """Read everything; ``size`` [bytes] where the contents cannot be trusted to state it.
 
     Raises:
-        ProtocolError: a size is stated that no EEPROM has, and none is given.
+        ProtocolError: the stated size is impossible, and ``size`` is not given.
         LinkTimeout, LinkLost: see `sii.read`.
     """
     if size is None:
@@ -46,9 +45,10 @@ def write_image(
     """Write the words in which ``target`` differs from ``present``, and read everything back.
 
     Raises:
-        NotAllowed: the drive's processor plays the EEPROM: what breaks off could not be repaired.
-        ProtocolError: something else reads back; the checksum is left wrong then.
-        LinkTimeout, LinkLost: it broke off; the checksum is wrong.
+        NotAllowed: the drive's processor emulates the EEPROM: a broken-off write could not be
+            repaired.
+        ProtocolError: the contents read back differ; the checksum is then left wrong.
+        LinkTimeout, LinkLost: the writing broke off; the checksum is wrong.
     """
     if (yield from sii.emulated(clock)):
         raise NotAllowed("ethercat.eeprom-emulated")

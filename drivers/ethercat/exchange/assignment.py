@@ -1,7 +1,7 @@
-"""Which PDOs are assigned in one direction, by the rules of the profile: pure, no I/O.
+"""Choice of the assigned PDOs in one direction, by the rules of the profile: pure, no I/O.
 
-Source: ETG.2000 v1.0.10 clauses 6.10 (Fixed, Mandatory, Exclude, Sm) and 6.9 (PDOs of an
-operation mode); ETG.1000.6 clause 5.6.7.4.
+Source: ETG.2000 v1.0.10 clauses 6.10 (Fixed, Mandatory, Exclude, Sm) and 6.9 (PDOs of an operation
+mode); ETG.1000.6 clause 5.6.7.4.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ Direction = Literal["rx", "tx"]
 
 @dataclass(frozen=True, slots=True)
 class AssignmentRules:
-    """What may be assigned in one direction of one drive.
+    """Rules for the assignment in one direction of one drive.
 
-    ``free`` is the set whose contents are written, None where none can be; ``kept`` are those
-    that are assigned others it. ``room_bytes`` is what the sync manager holds.
+    ``free`` is the PDO whose contents are written, None if there is none; ``kept`` are the PDOs
+    assigned next to it. ``room_bytes`` is the capacity of the sync manager.
     """
 
     sets: tuple[PdoSet, ...]
@@ -34,7 +34,7 @@ class AssignmentRules:
 
 
 def assignment_rules(profile: Profile, spec: PdoSpec, direction: Direction) -> AssignmentRules:
-    """The rules of ``profile`` for one direction."""
+    """Derive the rules for one direction from ``profile``."""
     rules = profile.bring_up
     assignable = rules is None or rules.coe.pdo_assign is not False
     sets = tuple(s for s in spec.sets if s.direction == direction)
@@ -67,7 +67,7 @@ def _room(rules: BringUp | None, spec: PdoSpec, direction: Direction) -> int | N
 def _default(
     spec: PdoSpec, sets: tuple[PdoSet, ...], direction: Direction, listed: Collection[int]
 ) -> tuple[PdoSet, ...]:
-    """What is assigned without a master's doing: PDOs with a sync manager, else the first one."""
+    """Return the PDOs assigned without a master: those with a sync manager, else the first one."""
     chosen = tuple(s for s in sets if s.index in listed)
     chosen = chosen or tuple(s for s in sets if s.sync_manager is not None)
     first = spec.default_rx if direction == "rx" else spec.default_tx
@@ -83,7 +83,7 @@ def _free(
     *,
     assignable: bool,
 ) -> PdoSet | None:
-    """The set to be filled: the profile's choice where the rules allow it, else another."""
+    """Return the PDO to fill: the profile's choice if the rules allow it, else another."""
     preferred = spec.free_set(direction)
     if preferred is None:
         return None
@@ -99,7 +99,7 @@ def _free(
 
 
 def compatible(one: PdoSet, other: PdoSet) -> bool:
-    """Whether two PDOs can be assigned together."""
+    """Return whether two PDOs can be assigned together."""
     return one is other or (other.index not in one.exclude and one.index not in other.exclude)
 
 
@@ -109,11 +109,11 @@ def choose_fixed(
     want: Collection[str],
     keys_of: Callable[[Sequence[PdoSet]], Collection[str]],
 ) -> tuple[PdoSet, ...] | None:
-    """PDOs with fixed contents that carry all of ``must`` and most of ``want``.
+    """Choose PDOs with fixed contents that carry all of ``must`` and most of ``want``.
 
-    ``keys_of`` gives the objects that a list of PDOs carries in whole bytes. One PDO others the
-    mandatory ones where that is enough, the default assignment where it carries as much, several
-    PDOs only where it takes them. None where no assignment carries ``must``.
+    ``keys_of`` returns the objects that a list of PDOs carries in whole bytes. One PDO next to the
+    mandatory ones is preferred if sufficient, the default assignment if it carries as much, and
+    several PDOs are used only if necessary. None if no assignment carries ``must``.
     """
     if not rules.assignable:
         return rules.default if set(must) <= set(keys_of(rules.default)) else None
@@ -138,12 +138,12 @@ def choose_fixed(
 
 
 def _with(rules: AssignmentRules, chosen: Sequence[PdoSet]) -> tuple[PdoSet, ...]:
-    """Mandatory PDOs and ``chosen`` in the file's order; empty where they exclude each other."""
+    """Return mandatory PDOs and ``chosen`` in file order; empty if they exclude each other."""
     wanted = {s.index for s in (*rules.mandatory, *chosen)}
     together = tuple(s for s in rules.sets if s.index in wanted)
     fits = all(compatible(one, other) for one in together for other in together)
     keys = [key for each in together if each.direction == "rx" for key in each.entries]
-    # An output in two places would have to be written in both.
+    # An output mapped twice would have to be written in both places.
     return together if fits and len(keys) == len(set(keys)) else ()
 
 
@@ -152,7 +152,7 @@ def _several(
     must: Collection[str],
     keys_of: Callable[[Sequence[PdoSet]], Collection[str]],
 ) -> tuple[PdoSet, ...]:
-    """Mandatory PDOs, and one after the other those that carry most of what is still missing."""
+    """Add to the mandatory PDOs, one by one, the PDO that carries most of what is missing."""
     taken = _with(rules, ())
     while missing := set(must) - set(keys_of(taken)):
         further = [

@@ -1,6 +1,6 @@
-"""What the maker's file prescribes for the way to Operational, as the host process obeys it.
+"""What the manufacturer's file prescribes on the way to Operational, as the host applies it.
 
-The server makes a `StationBringUp` of the profile; it travels to the host as a plain map.
+The server derives a `StationBringUp` from the profile; it is sent to the host as a plain map.
 Source: ETG.2000 v1.0.10; ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers), 6.8 (clocks).
 """
 
@@ -35,7 +35,7 @@ BEFORE_MAPPING, BEFORE_OP = ("IP", "PS"), ("SO",)
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """An object to be written on a transition."""
+    """An object to write during a state transition."""
 
     transition: str
     index: int
@@ -47,11 +47,11 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class StationBringUp:
-    """See the module. Times in ns unless their name says ms; None: the file does not say."""
+    """Bring-up of one station. Times in ns unless the name says ms; None: not in the file."""
 
     commands: tuple[Command, ...] = ()
     activate: int = PLAIN_ACTIVATE
-    """For 0980h; 0: without SYNC0, the drive follows the process data (ETG.2000, OpMode)."""
+    """Value for 0980h; 0: no SYNC0, the drive is synchronous to process data (ETG.2000, OpMode)."""
 
     sync0_cycle_ns: int = 0
     sync0_shift_ns: int = 0
@@ -59,7 +59,7 @@ class StationBringUp:
     watchdog_divider: int | None = None
     watchdog_limit_ns: int | None = None
     controls: tuple[tuple[int, int], ...] = ()
-    """Number and control byte of the sync managers of process data."""
+    """Number and control byte of each sync manager of process data."""
     complete_access: bool | None = None
     safeop_op_ms: int | None = None
     mailbox_ms: int | None = None
@@ -67,7 +67,7 @@ class StationBringUp:
 
 
 def station_bring_up(profile: Profile | None, cycle_ns: int) -> StationBringUp:
-    """What a profile prescribes for process data of this cycle [ns]."""
+    """Derive what a profile prescribes for process data with this cycle [ns]."""
     rules = profile.bring_up if profile is not None else None
     if rules is None:
         return StationBringUp(sync0_cycle_ns=cycle_ns)
@@ -97,8 +97,8 @@ def station_bring_up(profile: Profile | None, cycle_ns: int) -> StationBringUp:
 def _sync1_ns(mode: ClockMode | None, sync0_ns: int) -> int:
     """Register 9A4h: from SYNC0 to SYNC1, with whole SYNC0 cycles where SYNC1 is slower.
 
-    ETG.1000.4 clause 6.8: SYNC1 follows the first SYNC0 by this time, and then every
-    ``9A4h div 9A0h + 1`` cycles of SYNC0.
+    ETG.1000.4 clause 6.8: SYNC1 follows the first SYNC0 by this time, and then every ``9A4h div
+    9A0h + 1`` cycles of SYNC0.
     """
     if mode is None or mode.sync1 is None:
         return 0
@@ -107,11 +107,11 @@ def _sync1_ns(mode: ClockMode | None, sync0_ns: int) -> int:
 
 
 def withheld(command: InitCommand) -> Text | None:
-    """Why a command of the file is not written by this tool; None where it is.
+    """Return why this tool does not write a command of the file; None if it does.
 
-    The mode may be set, as the axis is not enabled before Operational; a control word, a target
-    or a forced output may not: the maker's file must not move the axis. The assignment of process
-    data is written as they are chosen.
+    The mode may be set, as the axis is not enabled before Operational; a control word, a target or
+    a forced output may not: the manufacturer's file must not move the axis. The PDO assignment is
+    written as chosen by this tool.
     """
     if any(command.index in each for each in _MAPPING):
         return text("ethercat.withheld-process-data")
@@ -153,12 +153,12 @@ def _commands(rules: BringUp) -> tuple[tuple[Command, ...], tuple[Text, ...]]:
 
 
 def to_wire(rules: StationBringUp) -> Message:
-    """As a plain map."""
+    """Convert to a plain map."""
     return asdict(replace(rules, notes=())) | {"notes": [each.to_wire() for each in rules.notes]}
 
 
 def from_wire(message: Message | None) -> StationBringUp | None:
-    """From the plain map; None where there is none."""
+    """Convert from the plain map; None for None."""
     if message is None:
         return None
     fields = dict(message)
@@ -171,7 +171,7 @@ def from_wire(message: Message | None) -> StationBringUp | None:
 def send_commands(
     station: Station, rules: StationBringUp, transitions: tuple[str, ...]
 ) -> Steps[None]:
-    """Write the commands of these transitions, each transition's in the order of the file.
+    """Write the commands of these transitions, in the order of the file within each transition.
 
     Raises:
         NotAllowed: the drive refuses one of them.
@@ -205,7 +205,7 @@ def set_watchdog_divider(station: Station, divider: int) -> Steps[None]:
     """Write 0400h.
 
     Raises:
-        NotAllowed: it reads back as something else.
+        NotAllowed: a different value reads back.
     """
     wanted = struct.pack("<H", divider)
     yield Write(WATCHDOG_DIVIDER, wanted)
@@ -216,9 +216,9 @@ def set_watchdog_divider(station: Station, divider: int) -> Steps[None]:
 
 
 def set_controls(station: Station, rules: StationBringUp) -> Steps[None]:
-    """Give the sync managers of process data the control bytes of the file.
+    """Set the control bytes of the process data sync managers as in the file.
 
-    The watchdog's bit stays as it is: whether outputs trigger it is this tool's to decide.
+    The watchdog bit is left unchanged: this tool decides whether outputs trigger the watchdog.
 
     Raises:
         ProtocolError: the station stopped answering.
@@ -237,13 +237,13 @@ def set_controls(station: Station, rules: StationBringUp) -> Steps[None]:
 
 
 def timeout_s(rules: StationBringUp | None, usual_s: float) -> float:
-    """How long a step to Safe-Op or Op may take: as usual, or as long as the file allows."""
+    """Return the time-out [s] of a step to Safe-Op or Op: the usual or the file's, if longer."""
     named_ms = None if rules is None else rules.safeop_op_ms
     return usual_s if named_ms is None else max(usual_s, named_ms / 1000)
 
 
 def apply_mailbox(station: Station, rules: StationBringUp) -> None:
-    """Complete access and timeouts as the file says; its notes become the station's."""
+    """Apply complete access and time-outs of the file, and add its notes to the station."""
     if rules.complete_access is False:
         station.complete_access = False
     if rules.mailbox_ms and station.mailbox is not None:

@@ -1,8 +1,8 @@
-"""The cyclic exchange: an absolute time grid, process data first, everything else after them.
+"""The cyclic exchange on an absolute time grid: process data first, then everything else.
 
-Allocation is kept to the few short-lived objects that pysoem itself makes; the garbage
-collector is off. A frame that does not come back costs its cycle and nothing more: the socket
-is asked with `select`, because SOEM's own time-outs round up to a jiffy of 4 ms.
+Allocation is limited to the few short-lived objects that pysoem itself creates; the garbage
+collector is off. A frame that does not come back costs only its own cycle: the socket is polled
+with `select`, because SOEM's own time-outs round up to a jiffy of 4 ms.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from drivers.motion.setpoint_plan import Phase
 from drivers.texts.message import text
 
 DISTRUST_S = 0.03
-"""Without valid process data for this long no setpoint can be trusted: every axis brakes."""
+"""Time without valid process data after which setpoints cannot be trusted: all axes brake [s]."""
 
 _DISTRUST_CYCLES, _SUSPICIOUS_CYCLES = 5, 2
 _RECEIVE_US = 300
@@ -52,7 +52,7 @@ class Image:
 
 @dataclass
 class CycleCounters:
-    """Since the start of the exchange. ``late`` counts wake-ups by powers of two of 1 µs."""
+    """Counters since the start of the exchange. ``late`` counts wake-ups by powers of two [µs]."""
 
     cycles: int = 0
     overruns: int = 0
@@ -66,19 +66,19 @@ class CycleCounters:
 
 
 def layout(entries: tuple[Entry, ...]) -> struct.Struct:
-    """The process data of one direction; bytes of no interest are skipped."""
+    """Return the layout of the process data of one direction; unused bytes are skipped."""
     parts = (f"{entry.size}x" if entry.code == "x" else entry.code for entry in entries)
     return struct.Struct("<" + "".join(parts))
 
 
 def places(entries: tuple[Entry, ...]) -> dict[int, int]:
-    """Object index (of subindex 0) to its place among the unpacked values."""
+    """Return the place of each object index (of subindex 0) among the unpacked values."""
     known = [entry for entry in entries if entry.code != "x"]
     return {entry.index: place for place, entry in enumerate(known) if entry.subindex == 0}
 
 
 class CyclicLoop:
-    """See the module. One call of `cycle` is one cycle; the caller uses the time that is left."""
+    """The cyclic loop, see the module docstring. The caller uses the time left after `cycle`."""
 
     def __init__(
         self,
@@ -90,8 +90,10 @@ class CyclicLoop:
         dc: bool,
         lockstep: float = 0.0,
     ) -> None:
-        """``lockstep`` is for segments whose time follows the frames: cycles are then never
-        skipped and replies awaited, at this many times the speed of real time at most.
+        """``lockstep`` is for segments whose time follows the frames.
+
+        Cycles are then never skipped and replies are awaited; time runs at most ``lockstep`` times
+        as fast as real time.
         """
         self.images = images
         self.cycle_ns = cycle_ns
@@ -118,7 +120,7 @@ class CyclicLoop:
         self._pairs: list[PairGuard] = []
 
     def start(self) -> None:
-        """Begin the grid now; frames no longer block."""
+        """Start the grid now; frames no longer block."""
         self._segment.wait_for_frames(False)
         for image in self.images:
             image.outputs = image.pack(*image.axis.outputs)
@@ -126,15 +128,15 @@ class CyclicLoop:
         self.next_ns = time.monotonic_ns() + self.cycle_ns
 
     def stop(self) -> None:
-        """Frames block again, for everything that is not cyclic."""
+        """Make frames block again, for everything that is not cyclic."""
         self._segment.wait_for_frames(True)
 
     def cycle(self) -> None:
-        """Wait for the grid, exchange process data, let every axis decide, keep the sample."""
+        """Wait for the grid, exchange process data, step every axis, and store the sample."""
         self._wait_for_grid()
         counters = self.counters
         wkc = self._exchange()
-        # A slave that fell back to SAFEOP still counts, so one left out may or may not add.
+        # A slave that fell back to SAFEOP still counts, so a station left out may or may not add.
         valid = self.expected_wkc <= wkc <= self.expected_wkc + self._left_out_wkc
         counters.cycles += 1
         counters.last_wkc = wkc
@@ -155,17 +157,17 @@ class CyclicLoop:
         self.next_ns += self.cycle_ns + (self._follow_clock() if follows and wkc > 0 else 0)
 
     def spare_ns(self) -> int:
-        """Time left for mailbox frames before the next cycle, with a margin kept."""
+        """Return the time [ns] for mailbox frames before the next cycle, less a margin."""
         if self._lockstep:
             return max(self._real_next_ns - time.monotonic_ns(), self.cycle_ns // 2)
         return self.next_ns - time.monotonic_ns() - max(_MARGIN_NS, self.cycle_ns // 5)
 
     def suspicious(self) -> bool:
-        """True once when several answers running lacked a station."""
+        """True once, when several consecutive answers lacked a station."""
         return self._invalid_run == _SUSPICIOUS_CYCLES and self.counters.last_wkc >= 0
 
     def moving(self) -> bool:
-        """Whether any axis plays or brakes."""
+        """Return whether any axis is moved by setpoints or brakes."""
         return any(image.axis.phase is not Phase.IDLE for image in self.images)
 
     def stop_axes(self, why: Halted, station: int | None = None) -> None:
@@ -175,12 +177,12 @@ class CyclicLoop:
                 image.axis.stop(why)
 
     def hold_together(self, pair: PairGuard) -> None:
-        """Watch two axes until both are at rest; it takes the place of what held one of them."""
+        """Couple two axes until both are idle, in place of any earlier coupling of either."""
         self._pairs = [p for p in self._pairs if not set(p.axes) & set(pair.axes)]
         self._pairs.append(pair)
 
     def leave_out(self, station: int, *, lost: bool) -> None:
-        """Take a lost station out of the expected working counter, or back in."""
+        """Take a lost station out of the expected working counter, or include it again."""
         for image in self.images:
             if image.station == station and image.lost is not lost:
                 image.lost = lost
@@ -222,10 +224,11 @@ class CyclicLoop:
         self.counters.late_max_us = max(self.counters.late_max_us, late_us)
 
     def _sampling_delay_ns(self, late: int) -> int:
-        """How much later than the grid the inputs of a late frame were sampled.
+        """Return the delay [ns] of the input sampling relative to the grid, for a late frame.
 
-        By SYNC0 they are sampled with the grid, half a cycle before the frame; a frame that passes
-        after the next SYNC0 gets the sample of that one. Without SYNC0 the frame samples.
+        With SYNC0, inputs are sampled on the grid, half a cycle before the frame; a frame that
+        passes after the next SYNC0 gets the sample of that one. Without SYNC0 the frame itself
+        triggers the sampling.
         """
         if not self.dc:
             return late
@@ -237,18 +240,18 @@ class CyclicLoop:
         self._master.send_processdata()
         left_s = (self.next_ns + self.cycle_ns - time.monotonic_ns()) * 0.95e-9
         if self._lockstep:
-            # A late reply is awaited; one that is missing must not hold up the others.
+            # A late reply is awaited; a missing one must not delay the others.
             left_s = self.cycle_ns * 1e-9 if self._invalid_run else _LOCKSTEP_WAIT_S
         if self._fd is None:
-            # Without a socket to wait for, SOEM asks the capture library again and again.
-            # Commands, a STOP among them, are received by another thread meanwhile.
+            # Without a socket to wait for, SOEM polls the capture library. Meanwhile another thread
+            # receives commands, a STOP among them.
             wait_us = round(max(left_s, _LEAST_WAIT_S) * 1e6)
             came = int(self._master.receive_processdata(wait_us, release_gil=True))
             self._segment.note_process_data(came_back=came >= 0)
             return came
         ready, _, _ = select.select((self._fd,), (), (), max(left_s, _LEAST_WAIT_S))
         if not ready:
-            # Shows SOEM to give the frame up; it returns at once.
+            # Makes SOEM give the frame up; it returns at once.
             self._master.receive_processdata(0)
             return -1
         wkc: int = self._master.receive_processdata(_RECEIVE_US)
@@ -273,7 +276,8 @@ class CyclicLoop:
         try:
             outputs = image.pack(*axis.outputs)
         except struct.error:
-            # A setpoint outside its type: the last good one stays while the axis brakes.
+            # A setpoint does not fit its type: the last valid outputs are kept while the axis
+            # brakes.
             axis.stop(Halted(HaltCause.UNFIT))
             return
         if outputs != image.outputs:
@@ -307,7 +311,7 @@ class CyclicLoop:
         return parts
 
     def _follow_clock(self) -> int:
-        """Correction of the grid so that frames pass half a cycle before SYNC0."""
+        """Return the correction of the grid [ns] so that frames pass half a cycle before SYNC0."""
         error = self._phase.error_ns(self._master.dc_time, self._late_ns)
         self.counters.dc_deviation_ns = error
         if abs(error) > self.counters.dc_deviation_max_ns and self.number > 2000:
@@ -316,7 +320,7 @@ class CyclicLoop:
 
 
 def percentile_us(late: list[int], fraction: float) -> int:
-    """Upper edge [µs] of the bin below which ``fraction`` of all wake-ups lie."""
+    """Return the upper edge [µs] of the bin below which ``fraction`` of all wake-ups lie."""
     total = sum(late)
     seen = 0
     for place, count in enumerate(late):

@@ -1,4 +1,4 @@
-"""Setting cyclic exchange up, starting, stopping and healing it, in the host process."""
+"""Set-up, start, stop and recovery of the cyclic exchange, in the host process."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ from drivers.motion.setpoint_plan import Motion, limits_of
 from drivers.texts.message import Text, text
 
 _NOT_YET, _OP_TRIES, _OP_PAUSE_S = (0x001B, 0x002D), 5, 0.2
-"""Process data or SYNC0 stayed away (AL status codes of ETG.1020 table 2)."""
+"""AL status codes for missing process data or SYNC0 (ETG.1020 table 2); attempts; pause [s]."""
 _LEAVE_S, _SETTLE_DC_S, _SETTLE_S = 0.5, 0.4, 0.02
 _STOPPING = Halted(HaltCause.COMMANDED, note=text("ethercat.cyclic-exchange-being-stopped"))
 _NO_ANSWER = Halted(HaltCause.LOST, note=text("ethercat.drive-no-longer-answers"))
 
 
 def enter_op(station: Station, limit_s: float) -> Steps[None]:
-    """To OP; once more where data or SYNC0 just stayed away: a computer may stall for 50 ms.
+    """Go to OP; retry if data or SYNC0 were briefly missing: a computer may stall for 50 ms.
 
     Raises:
-        NotAllowed: the station refuses OP, with the reason that it names.
+        NotAllowed: the station refuses OP, with the reason that it states.
     """
     for _ in range(_OP_TRIES - 1):
         try:
@@ -77,14 +77,14 @@ class Exchange:
         self.lockstep = 0.0
         """Above 0: the segment's time follows the frames, see `CyclicLoop`."""
         self.operational = False
-        """All configured stations have reached OP and none was asked to leave it."""
+        """All configured stations have reached OP, and no stop has been requested."""
 
     def end_set_up_when(self, stop_waits: Callable[[], bool]) -> None:
-        """A set-up ends with an error once this is true: STOP is not kept waiting by it."""
+        """Set the condition that ends a set-up with an error, so that it never delays a STOP."""
         self._preparation.stop_waits = stop_waits
 
     def prepare(self, stations: Sequence[Station]) -> None:
-        """Identify all stations after a search, which leaves those that can in PREOP."""
+        """Identify all stations after a search; those that can be are then in PREOP."""
         self._images = []
         self._preparation.identify(stations)
 
@@ -105,7 +105,7 @@ class Exchange:
         }
 
     def planned(self, number: int) -> StationSetup | None:
-        """What was last to be set up at a station, also where that was refused."""
+        """Return the last set-up planned for a station, including one that was refused."""
         return self._preparation.planned(number)
 
     # Start and stop ------------------------------------------------------------------------
@@ -146,7 +146,7 @@ class Exchange:
             return reached
 
         for number in self.setups:
-            # Commands before OP travel by the mailbox, which only its own lane may use.
+            # Commands before OP use the mailbox, which only its own lane may access.
             lane: LaneName = "mailbox" if self._has_commands(number) else "register"
             self._lanes.submit(number, lane, self._to_op(number), one(number))
 
@@ -165,7 +165,7 @@ class Exchange:
         yield from enter_op(station, timeout_s(rules, STATE_TIMEOUT_S[AlState.OP]))
 
     def stop(self, done: Done) -> None:
-        """Brake what moves, disable, leave OP, then end the exchange."""
+        """Brake moving axes, disable, leave OP, then end the exchange."""
         if self.loop is None:
             done(None, None)
             return
@@ -174,7 +174,7 @@ class Exchange:
         self._leaving = (time.monotonic() + _LEAVE_S, done)
 
     def housekeeping(self) -> None:
-        """Finish a stop once the axes stand."""
+        """Complete a stop once the axes are at standstill."""
         if self._leaving is None or self.loop is None:
             return
         deadline, done = self._leaving
@@ -206,7 +206,7 @@ class Exchange:
         )
 
     def abandon(self) -> None:
-        """End the exchange at once; the slaves' watchdogs stop what still moves."""
+        """End the exchange at once; the slaves' watchdogs stop any axis that still moves."""
         if self.loop is not None:
             self.loop.stop()
         self.loop = None
@@ -216,7 +216,7 @@ class Exchange:
         self._healing.clear()
 
     def shut_down(self, why: Text) -> None:
-        """Brake and disable within half a second, then leave OP. Blocks; for the end only."""
+        """Brake and disable within half a second, then leave OP. Blocks; only for the shutdown."""
         loop = self.loop
         if loop is None:
             return
@@ -231,13 +231,13 @@ class Exchange:
     # Healing -------------------------------------------------------------------------------
 
     def station_lost(self, station: int) -> None:
-        """A station no longer answers: its axis ends, the others go on without it."""
+        """Handle a station that no longer answers: its motion ends, the others continue."""
         if self.loop is not None:
             self.loop.stop_axes(_NO_ANSWER, station)
             self.loop.leave_out(station, lost=True)
 
     def healing(self, station: int) -> bool:
-        """Whether a station is on its way back to OP."""
+        """Return whether a station is on its way back to OP."""
         return station in self._healing
 
     def heal(self, station: Station, *, restarted: bool) -> None:
@@ -283,10 +283,10 @@ class Exchange:
     # Axes ----------------------------------------------------------------------------------
 
     def axis(self, number: int) -> AxisLoop:
-        """The axis of a station.
+        """Return the axis of a station.
 
         Raises:
-            NotAllowed: no cyclic exchange, or the station has no process data.
+            NotAllowed: no cyclic exchange, the station has no process data, or it does not answer.
         """
         if self.loop is None:
             raise NotAllowed("ethercat.cyclic-exchange-not-run")
@@ -298,12 +298,12 @@ class Exchange:
         raise NotAllowed("ethercat.station-no-cyclic-data", station=number)
 
     def play(self, trajectories: Sequence[Message], coupled: Message | None) -> int:
-        """Begin trajectories together in the next cycle; returns its number.
+        """Start trajectories together in the next cycle; return its number.
 
         Two of them may be ``coupled``, see `drivers.link.Coupled`.
 
         Raises:
-            NotAllowed: one of them is not possible; then none begins.
+            NotAllowed: one of them is not possible; then none starts.
         """
         axes = [self.axis(int(item["station"])) for item in trajectories]
         motions = [_motion(item, self._cycle_ns) for item in trajectories]
@@ -319,10 +319,10 @@ class Exchange:
         return self.loop.number
 
     def route_write(self, station: int, index: int, subindex: int, data: bytes) -> bool:
-        """Take a write to a mapped output into the process data; False when it is not mapped.
+        """Set a mapped output in the process data; return False if it is not mapped.
 
         Raises:
-            NotAllowed: the control word and setpoints belong to the loop.
+            NotAllowed: the control word or a setpoint, which only the loop may write.
         """
         if self.loop is None or station not in self.setups:
             return False
@@ -343,7 +343,7 @@ class Exchange:
         return False
 
     def status(self) -> Message:
-        """Figures for the link quality, with units in their names."""
+        """Return figures for the link quality, with units in their names."""
         loop = self.loop
         if loop is None:
             return {"running": False}

@@ -1,7 +1,7 @@
-"""Which signals go into the process data of a drive: pure, no I/O.
+"""Choice of the signals in the process data of a drive: pure, no I/O.
 
-A drive that can be remapped gets exactly the wanted objects in its default PDO; one that cannot
-gets that of its fixed sets which carries most of them. What is left over is polled.
+A drive that can be remapped gets exactly the requested objects in its default PDO; a drive that
+cannot gets the fixed PDOs that carry most of them. The remaining signals are polled.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CONTROL_WORD = Address(0x6040, 0, "UINT16")
 STATUS_WORD = Address(0x6041, 0, "UINT16")
 POSITION_ACTUAL = Address(0x6064, 0, "INT32")
 
-#: For a drive without a profile: what every CiA 402 drive known to us can take.
+#: For a drive without a profile: what every CiA 402 drive known to us accepts.
 _GENERIC_ENTRIES, _GENERIC_RX, _GENERIC_TX = 8, 0x1600, 0x1A00
 
 _CODE = {
@@ -38,7 +38,7 @@ _CODE = {
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One object in a PDO. ``code`` is its `struct` letter, ``x`` for bytes of no interest."""
+    """One object in a PDO. ``code`` is its `struct` letter, ``x`` for unused bytes."""
 
     index: int
     subindex: int
@@ -53,7 +53,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Pdo:
-    """One PDO with its entries; ``write`` when the mapping object has to be written."""
+    """One PDO with its entries; ``write``: the mapping object has to be written."""
 
     index: int
     entries: tuple[Entry, ...]
@@ -63,25 +63,25 @@ class Pdo:
 
     @property
     def mapping_words(self) -> tuple[int, ...]:
-        """What its mapping object holds (ETG.1000.6 clause 5.6.7.4.7)."""
+        """Contents of its mapping object (ETG.1000.6 clause 5.6.7.4.7)."""
         return self.words or tuple(entry.word for entry in self.entries)
 
     @property
     def ragged(self) -> bool:
-        """Whether it does not end at a byte."""
+        """Whether it does not end on a byte boundary."""
         return sum(word & 0xFF for word in self.mapping_words) % 8 != 0
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return sum(entry.size for entry in self.entries)
 
 
 @dataclass(frozen=True, slots=True)
 class Assigned:
-    """All PDOs of one direction in their order, and what they carry byte by byte.
+    """All PDOs of one direction in their order, and their contents byte by byte.
 
-    ``assign`` is False where the drive's assignment cannot be written: it has these by itself.
+    ``assign`` is False if the drive's assignment cannot be written: these are its own.
     """
 
     pdos: tuple[Pdo, ...]
@@ -90,7 +90,7 @@ class Assigned:
 
     @property
     def index(self) -> int:
-        """The PDO that is written, else the first one."""
+        """Index of the PDO that is written, else of the first one."""
         written = (pdo.index for pdo in self.pdos if pdo.write)
         return next(written, self.pdos[0].index)
 
@@ -101,30 +101,30 @@ class Assigned:
 
     @property
     def mapping_words(self) -> tuple[int, ...]:
-        """What the mapping objects hold, one after the other."""
+        """Contents of the mapping objects, one after the other."""
         return tuple(word for pdo in self.pdos for word in pdo.mapping_words)
 
     @property
     def size(self) -> int:
-        """Bytes."""
+        """Size in bytes."""
         return sum(entry.size for entry in self.entries)
 
 
 def alone(pdo: Pdo) -> Assigned:
-    """One PDO for a direction."""
+    """Return a direction with a single PDO."""
     return Assigned((pdo,), pdo.entries)
 
 
 @dataclass(frozen=True, slots=True)
 class StationPlan:
-    """Process data of one station, and what of the wish is in them."""
+    """Process data of one station, and which of the requested signals they contain."""
 
     station: int
     rx: Assigned
     tx: Assigned
     mapped: tuple[CyclicSignal, ...]
     left_over: tuple[tuple[CyclicSignal, Text], ...]
-    """Signals for polling, each with the reason."""
+    """Signals to poll, each with the reason."""
 
 
 def plan_station(
@@ -135,12 +135,12 @@ def plan_station(
 ) -> StationPlan:
     """Choose the process data of one station.
 
-    Outputs are all needed but the optional ones, and with a target its control word, status word
-    and actual position, so that the loop can stop the axis by itself. Optional outputs and inputs
-    fill the rest in their order.
+    All outputs except the optional ones are required; with a setpoint among them, control word,
+    status word and actual position are required too, so that the loop can stop the axis by itself.
+    Optional outputs and inputs fill the remaining room in their order.
 
     Raises:
-        NotAllowed: an output that is needed cannot be mapped, or all of them do not fit.
+        NotAllowed: a required output cannot be mapped, or the required ones do not all fit.
     """
     needed_out = [signal.address for signal in outputs if not signal.optional]
     optional = [signal.address for signal in outputs if signal.optional]
@@ -205,7 +205,7 @@ def _direction(
 
 @dataclass(frozen=True, slots=True)
 class _Room:
-    """The PDO to be filled, how much it takes, and what is assigned next to it."""
+    """The PDO to fill, its capacity, and the PDOs assigned next to it."""
 
     index: int
     most: int
@@ -216,12 +216,12 @@ class _Room:
     profile: Profile | None = None
 
     def assigned(self, entries: Sequence[Entry]) -> Assigned:
-        """With these entries in the free PDO, behind the kept ones."""
+        """Return the assignment with these entries in the free PDO, together with the kept PDOs."""
         filled = Pdo(self.index, tuple(entries), write=True)
         if not self.kept or self.profile is None:
             return Assigned((filled,), filled.entries, self.assignable)
         kept = tuple(_fixed_pdo(each, self.profile) for each in self.kept)
-        # One that does not end at a byte stands last: what follows it would not begin at one.
+        # A PDO that does not end on a byte boundary is placed last, as it would shift what follows.
         pdos = sorted((*kept, filled), key=lambda pdo: (pdo.ragged, pdo.index))
         loose = tuple(e for pdo in pdos for e in pdo.entries)
         return Assigned(tuple(pdos), loose, self.assignable)
@@ -299,7 +299,7 @@ def _fixed(
     profile: Profile,
     rules: AssignmentRules,
 ) -> Assigned:
-    """The fixed PDOs that have all that is needed and most of what is wished."""
+    """Choose the fixed PDOs with all required objects and most of the requested ones."""
     must = {str(address) for address in needed}
     want = {str(address) for address in wish}
 
@@ -325,25 +325,25 @@ def _fixed_pdo(each: PdoSet, profile: Profile) -> Pdo:
 
 
 def _reached(entries: Sequence[Entry]) -> set[str]:
-    """Keys of the objects that lie in whole bytes of a PDO."""
+    """Return the keys of the objects that occupy whole bytes of a PDO."""
     return {f"{e.index:04X}:{e.subindex:02X}" for e in entries if e.code != "x"}
 
 
 def _word(part: PdoPart) -> int:
-    """The mapping entry of a stretch; padding has index 0."""
+    """Return the mapping entry of a part of a PDO; padding has index 0."""
     if part.key is None:
         return part.bits
     return int(part.key[:4], 16) << 16 | int(part.key[5:], 16) << 8 | part.bits
 
 
 def _set_entries(chosen: Sequence[PdoSet], profile: Profile) -> tuple[Entry, ...]:
-    """Contents byte by byte; padding and single bits become bytes of no interest.
+    """Return the contents byte by byte; padding and single bits become unused bytes.
 
     PDOs of one direction follow each other without a gap, bit by bit (ETG.1000.4 clause 6.6).
     """
     entries: list[Entry] = []
     seen: set[tuple[int, int]] = set()
-    loose = 0  # bits since the last object that begins at a byte
+    loose = 0  # bits since the last object that begins on a byte boundary
     for part in (part for each in chosen for part in _parts(each, profile)):
         known = profile.by_key.get(part.key) if part.key is not None else None
         entry = None if known is None else _entry_of(known)
@@ -351,7 +351,7 @@ def _set_entries(chosen: Sequence[PdoSet], profile: Profile) -> tuple[Entry, ...
             loose += part.bits
             continue
         if (entry.index, entry.subindex) in seen:
-            # Mapped twice: the first place is the one that is used.
+            # Mapped twice: the first place is used.
             loose += part.bits
             continue
         seen.add((entry.index, entry.subindex))

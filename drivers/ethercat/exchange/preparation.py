@@ -1,4 +1,4 @@
-"""Everything between "these signals, please" and SAFEOP, in the host process."""
+"""Preparation of process data, from the requested signals to SAFEOP, in the host process."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Preparation:
         self._lanes = lanes
         self._report = report
         self.stop_waits: Callable[[], bool] = lambda: False
-        """Whether a word that stops an axis has come meanwhile; the set-up ends for it."""
+        """Whether a command that stops an axis has arrived meanwhile; it ends the set-up."""
         self._stations: Sequence[Station] = ()
         self._setups: dict[int, StationSetup] = {}
         self._snapshots: dict[int, Snapshot] = {}
@@ -62,11 +62,11 @@ class Preparation:
         self._dc = False
 
     def planned(self, number: int) -> StationSetup | None:
-        """What was last to be set up at a station."""
+        """Return the last set-up planned for a station."""
         return self._setups.get(number)
 
     def identify(self, stations: Sequence[Station]) -> None:
-        """Identify all stations after a search, which leaves those that can in PREOP."""
+        """Identify all stations after a search; those that can be are then in PREOP."""
         jobs = {s.number: identify(s, time.monotonic) for s in stations}
         self._run("mailbox", jobs, "ethercat.doing-identifying")
 
@@ -77,7 +77,7 @@ class Preparation:
 
         Raises:
             NotAllowed: cycle, mapping or watchdog is not possible, with drive and reason.
-            FoundInPart, InvalidMap: search or mapping were disturbed; one more search may help.
+            FoundInPart, InvalidMap: search or mapping was disturbed; one more search may help.
         """
         cycle_ns = int(message["cycle_ns"])
         if not CYCLE_NS[0] <= cycle_ns <= CYCLE_NS[1]:
@@ -123,7 +123,7 @@ class Preparation:
         self._run("mailbox", jobs, "ethercat.doing-writing-mapping")
 
     def _map(self) -> dict[int, list[int]]:
-        """Build the IO map; returns the values that the outputs begin with."""
+        """Build the IO map; return the initial values of the outputs."""
         sizes = {
             station.number: setup_.assigned_bytes(station)
             for station in self._stations
@@ -140,7 +140,7 @@ class Preparation:
         )
         if total > IO_MAP_BYTES:
             self._segment.map(total)
-        # An emergency that lies in a mailbox would make SOEM's mapping fail.
+        # An emergency waiting in a mailbox would make SOEM's mapping fail.
         drains = {s.number: s.box.drain() for s in self._stations if s.mailbox is not None}
         self._run("mailbox", drains, "ethercat.doing-emptying-mailboxes")
         self._announce_life("ethercat.doing-building-map")
@@ -148,7 +148,7 @@ class Preparation:
         wrong = {n: p for n, p in self._setups.items() if not self._fits(n, p)}
         if not wrong:
             return initial
-        # Perhaps SOEM missed an answer.
+        # SOEM may have missed an answer.
         number, plan = next(iter(wrong.items()))
         reported = self._segment.sizes(number)
         raise InvalidMap(
@@ -183,7 +183,7 @@ class Preparation:
                 for number, plan in self._setups.items()
             }
             self._run("register", starts, "ethercat.doing-sync0")
-        # SOEM used the mailboxes by itself: its counter is unknown to us.
+        # SOEM used the mailboxes by itself: the state of its counter is unknown.
         fences = {
             s.number: coe.settle(s.box, force=True) for s in self._stations if s.mailbox is not None
         }
@@ -198,7 +198,7 @@ class Preparation:
             {n: setup_.take_snapshot() for n in self._setups},
             "ethercat.doing-registers",
         )
-        # Other drives stay in PREOP: nobody has set their process data up.
+        # Other drives stay in PREOP, as their process data are not set up.
         spared = {
             s.number: setup_.spare(s)
             for s in self._stations
@@ -234,7 +234,7 @@ class Preparation:
         )
 
     def _announce_life(self, doing: str) -> None:
-        """Show a sign of life; ``doing`` is the code of what takes so long."""
+        """Extend the host's deadline; ``doing`` is the code of the lengthy step."""
         self._ring.host_lives_until(time.monotonic_ns() + int(_SETUP_S * 1e9), doing)
 
     def _run(
@@ -244,7 +244,7 @@ class Preparation:
         doing: str,
         optional: set[int] | frozenset[int] = frozenset(),
     ) -> dict[int, T]:
-        """Run one transaction per station, all at once, to the end."""
+        """Run one transaction per station, all at once, until all have ended."""
         self._announce_life(doing)
         results: dict[int, T] = {}
         errors: dict[int, DriveError] = {}

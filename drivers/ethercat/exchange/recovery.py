@@ -1,8 +1,8 @@
-"""Setting the cyclic exchange up again after it broke off, without anybody asking.
+"""Automatic restart of the cyclic exchange after it broke off.
 
-An exchange that somebody started stays wanted until somebody ends it. When its process died, its
-interface vanished or the loop gave up, it is configured and started again as soon as the segment
-can be reached, with growing pauses. Every axis comes back disabled: nothing here enables, and
+A started exchange remains requested until it is stopped. If its process died, its interface
+vanished or the loop gave up, it is configured and started again as soon as the segment can be
+reached, with growing pauses. Every axis comes back disabled: nothing here enables an axis, and
 motions that ran before have ended.
 """
 
@@ -19,7 +19,7 @@ PAUSES_S = (0.3, 1.0, 3.0, 10.0)
 
 
 class Recovery:
-    """Calls ``set_up`` until it succeeds; ``notify`` gets a message at every change."""
+    """Calls ``set_up`` until it succeeds; ``notify`` receives a message at every change."""
 
     def __init__(
         self,
@@ -27,27 +27,30 @@ class Recovery:
         set_up: Callable[[], Awaitable[None]],
         notify: Callable[[Text, bool], None],
     ) -> None:
-        """``ready`` says whether an attempt makes sense, ``notify`` whether all is well again."""
+        """``ready`` returns whether an attempt makes sense.
+
+        ``notify`` receives a message and whether the exchange runs again.
+        """
         self._ready = ready
         self._set_up = set_up
         self._notify = notify
         self._task: asyncio.Task[None] | None = None
         self.trouble: Text | None = None
-        """Why the exchange does not run although it is wanted; else None."""
+        """Why the exchange does not run although it is requested; None otherwise."""
 
     @property
     def active(self) -> bool:
-        """Whether the exchange is being set up again, or waits for that."""
+        """Whether the exchange is being set up again or waits for the next attempt."""
         return self._task is not None
 
     def begin(self, why: Text) -> None:
-        """Start trying; does nothing while that goes on already."""
+        """Start the attempts; no effect while they are running."""
         if self._task is None:
             self.trouble = why
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     async def end(self) -> None:
-        """Give up, because the exchange is no longer wanted."""
+        """End the attempts, because the exchange is no longer requested."""
         task, self._task = self._task, None
         self.trouble = None
         if task is not None and task is not asyncio.current_task():

@@ -1,8 +1,8 @@
 """Samples from the cyclic loop to the server: a preallocated ring in shared memory.
 
-One writer, one reader, no locks: the writer fills a slot and then advances the count; the
-reader copies and then checks that the writer has not come round meanwhile. The first page also
-carries the signs of life of both sides.
+One writer, one reader, no locks: the writer fills a slot and then advances the count; the reader
+copies and then checks that the writer has not overwritten the slots meanwhile. The first page also
+holds the keep-alive times of both sides.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ SLOT = struct.Struct("<QqqiiII")
 """Cycle counter, monotonic time [ns], DC time [ns], WKC, expected WKC, flags, lateness [µs]."""
 
 VALID = 1
-"""Working counter as expected and frame back in time."""
+"""Working counter as expected, and frame back in time."""
 RESYNCED = 2
 """Grid points were skipped before this cycle: the computer was late."""
 _LOST, _LOST_PLACES = 8, 24
 
 
 def lost_flag(place: int) -> int:
-    """Flag of the station at ``place`` among those exchanged: it is lost, its inputs are old.
+    """Return the flag for a lost station, whose inputs are old, by its place in the exchange.
 
-    Beyond what the flags have room for one stands for all.
+    Stations beyond the available flags share the last one.
     """
     return 1 << _LOST + min(place, _LOST_PLACES - 1)
 
@@ -67,7 +67,7 @@ class Ring:
 
     @staticmethod
     def create() -> int:
-        """A new memory file; it vanishes with the last process that holds it."""
+        """Create a memory file; it vanishes with the last process that holds it."""
         descriptor = shared_memory_file("servodeck-ethercat")
         try:
             os.ftruncate(descriptor, RING_BYTES)
@@ -78,9 +78,9 @@ class Ring:
 
     @staticmethod
     def create_file() -> Path:
-        """A new file in the folder for temporary files, where a child inherits no descriptor.
+        """Create a file in the temporary folder, where a child inherits no descriptor.
 
-        Whoever creates it removes it.
+        The caller removes it.
         """
         descriptor, name = tempfile.mkstemp(prefix="servodeck-ethercat-")
         try:
@@ -91,21 +91,21 @@ class Ring:
 
     @classmethod
     def of_file(cls, path: Path) -> Ring:
-        """One end of the ring in a file of `create_file`."""
+        """Open one end of the ring in a file of `create_file`."""
         with path.open("r+b") as file:
             return cls(file.fileno())
 
     def close(self) -> None:
-        """Give the memory back."""
+        """Release the memory."""
         self._view.release()
-        # A reader that is being cancelled may still look at it: then it goes with the reader.
+        # A reader being cancelled may still use it: the memory is then released with the reader.
         with contextlib.suppress(BufferError):
             self._map.close()
 
     # Signs of life -------------------------------------------------------------------------
 
     def host_lives_until(self, deadline_ns: int, doing: str = "") -> None:
-        """The host announces that it comes back before ``deadline_ns`` (monotonic).
+        """Announce that the host comes back before ``deadline_ns`` (monotonic).
 
         ``doing`` is the code of what it does until then.
         """
@@ -115,20 +115,20 @@ class Ring:
         _U64.pack_into(self._view, _HOST_DEADLINE, deadline_ns)
 
     def host_deadline_ns(self) -> int:
-        """When the host should have come back; 0 before its first announcement."""
+        """Return the host's deadline (monotonic); 0 before its first announcement."""
         return int(_U64.unpack_from(self._view, _HOST_DEADLINE)[0])
 
     def host_doing(self) -> str:
-        """What the host does until its deadline, as a code; empty where it reported nothing."""
+        """Return the code of what the host does until its deadline; empty if not reported."""
         raw = bytes(self._view[_BUSY_TEXT : _BUSY_TEXT + _BUSY_ROOM])
         return raw.split(b"\0", 1)[0].decode("utf-8", "replace")
 
     def server_lives(self, now_ns: int) -> None:
-        """The server's sign of life."""
+        """Record the server's keep-alive time."""
         _U64.pack_into(self._view, _SERVER_ALIVE, now_ns)
 
     def server_seen_ns(self) -> int:
-        """When the server last gave a sign."""
+        """Return the time of the server's last keep-alive (monotonic)."""
         return int(_U64.unpack_from(self._view, _SERVER_ALIVE)[0])
 
     # Writing (host) ------------------------------------------------------------------------
@@ -157,7 +157,7 @@ class Ring:
     # Reading (server) ----------------------------------------------------------------------
 
     def reader(self, fields: dict[str, tuple[str, int]]) -> RingReader:
-        """A reader; ``fields`` are name to (numpy type, offset in the payload)."""
+        """Create a reader; ``fields`` map a name to (numpy type, offset in the payload)."""
         slot_size = int(_U64.unpack_from(self._view, _SLOT_SIZE)[0])
         slots = int(_U64.unpack_from(self._view, _SLOTS)[0])
         every = _HEADER_FIELDS | {
@@ -175,7 +175,7 @@ class Ring:
         return RingReader(self, array, self.count())
 
     def count(self) -> int:
-        """Samples written since `prepare`."""
+        """Return the number of samples written since `prepare`."""
         return int(_U64.unpack_from(self._view, _COUNT)[0])
 
 
@@ -188,26 +188,26 @@ class RingReader:
     position: int
 
     def drain(self) -> tuple[npt.NDArray[np.void], int]:
-        """Everything new [n], and how many samples were overwritten before they were read."""
+        """Return all new samples [n], and how many were overwritten before they were read."""
         slots = len(self.array)
         count = self.ring.count()
         start = max(self.position, count - slots + 1)
         lost = start - self.position
         taken = self.array[np.arange(start, count) % slots]
-        # The writer may have come round while we copied: those slots cannot be trusted.
+        # The writer may have wrapped round during the copy: those slots cannot be trusted.
         overwritten = max(self.ring.count() - slots + 1 - start, 0)
         self.position = count
         return taken[overwritten:], lost + min(overwritten, len(taken))
 
     def newest(self) -> npt.NDArray[np.void] | None:
-        """The last sample [1], without taking it; None before the first."""
+        """Return the last sample [1] without consuming it; None before the first."""
         count = self.ring.count()
         if not count or not len(self.array):
             return None
-        # The writer is at another slot, and comes round to this one only after all the others.
+        # The writer is at another slot, and returns to this one only after all the others.
         place = (count - 1) % len(self.array)
         return self.array[place : place + 1].copy()
 
     def release(self) -> None:
-        """Let go of the shared memory, so that it can be closed."""
+        """Release the shared memory, so that it can be closed."""
         self.array = self.array[:0].copy()

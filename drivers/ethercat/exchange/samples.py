@@ -1,4 +1,4 @@
-"""What a sample of the ring holds: where each channel lies, and which samples follow each other."""
+"""Layout of a sample in the ring: the position of each channel, and contiguous runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NUMPY = {
 
 
 def contiguous(taken: npt.NDArray[np.void]) -> list[npt.NDArray[np.void]]:
-    """Runs without a gap in the cycle counter."""
+    """Split into runs without a gap in the cycle counter."""
     if not len(taken):
         return []
     breaks = np.flatnonzero(np.diff(taken["cycle"].astype(np.int64)) != 1) + 1
@@ -24,7 +24,7 @@ def contiguous(taken: npt.NDArray[np.void]) -> list[npt.NDArray[np.void]]:
 
 
 def fields_of(plans: Sequence[StationPlan]) -> dict[str, tuple[str, int]]:
-    """Channel name to numpy type and offset in a sample: outputs, then inputs, per station."""
+    """Map channel name to numpy type and offset in a sample: outputs, then inputs, per station."""
     fields: dict[str, tuple[str, int]] = {}
     start = 0
     for plan in plans:

@@ -1,4 +1,4 @@
-"""`drivers.link.Cyclic` over the host process."""
+"""`drivers.link.Cyclic` by means of the host process."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _ANSWER_S, _CONFIGURE_S, _START_S, _STOP_S = 5.0, 60.0, 25.0, 15.0
 _DRAIN_S = 0.04
 _RENEW_S, _PATIENCE = 0.05, 10
 WATCHDOG_MS = 50.0
-"""Process-data watchdog in the slaves: with braking well below the 200 ms that are allowed."""
+"""Process-data watchdog in the slaves [ms]; with braking well below the 200 ms allowed."""
 
 
 @dataclass
@@ -50,8 +50,8 @@ class _Consumer:
 class EthercatCyclic:
     """Synchronous process data of one segment. See `drivers.link.Cyclic`.
 
-    The loop owns the control word: enable and disable with `drive_to`. Setpoints live
-    ``renew_s`` from `play` and from every `renew`; `run` plays and renews while its task lives.
+    The loop owns the control word: enable and disable with `drive_to`. Setpoints are valid for
+    ``renew_s`` from `play` and from every `renew`; `run` plays and renews until its task ends.
     """
 
     def __init__(
@@ -62,11 +62,12 @@ class EthercatCyclic:
         note: Callable[[str, int | None], None] = lambda _text, _station: None,
         unproven: Kept | None = None,
     ) -> None:
-        """``notify`` gets a message when the exchange breaks off (False) or runs again (True).
+        """Create the exchange of a segment.
 
-        ``note`` gets what is commanded, with its station, for the record of the bus.
-        ``unproven``: this system gives no guarantee, so that process data need a check that has
-        shown how punctual computer and adapter are; where the last one is kept.
+        ``notify`` receives a message when the exchange breaks off (False) or runs again (True).
+        ``note`` receives each command with its station, for the recording of the bus. ``unproven``:
+        this system guarantees no real time, so that process data require a check of the timing of
+        computer and adapter; this is where the last result is kept.
         """
         self._note = note
         self._unproven = unproven
@@ -95,24 +96,24 @@ class EthercatCyclic:
 
     @property
     def power(self) -> EthercatCyclic:
-        """Its loop writes the control words."""
+        """The exchange itself: its loop writes the control words."""
         return self
 
     @property
     def pairs(self) -> EthercatCyclic:
-        """The loop can hold two axes together."""
+        """The exchange itself: its loop can couple two axes."""
         return self
 
     @property
     def speeds(self) -> None:
-        """Speeds are given to drives with a cyclic mode only."""
+        """None: velocity setpoints require a drive with a cyclic mode."""
 
     async def configure(
         self, inputs: Sequence[CyclicSignal], outputs: Sequence[CyclicSignal], cycle_s: float
     ) -> tuple[CyclicSignal, ...]:
         """Map signals and return those that fit; the others are in `left_over`.
 
-        Every drive is reset to PREOP for it, so the exchange must not run.
+        Every drive is reset to PREOP for this, so the exchange must not run.
 
         Raises:
             NotAllowed: cycle time, an output that does not fit, a drive that refuses, or a
@@ -149,7 +150,7 @@ class EthercatCyclic:
         return tuple(signal for plan in plans for signal in plan.mapped)
 
     async def _require_punctual(self, kept: Kept, station: int, cycle_s: float) -> None:
-        """The last check allows this cycle, or one that is made now, which takes 10 s."""
+        """Require a timing check that allows this cycle: the last one, or a new one of 10 s."""
         require_fine_clock()
         found = kept.read()
         if found is None or not found.allows(cycle_s * 1e6):
@@ -174,24 +175,24 @@ class EthercatCyclic:
         self._wanted = True
 
     async def stop(self) -> None:
-        """Brake whatever moves, disable, leave Operational; from now on it is not wanted."""
+        """Brake moving axes, disable, leave Operational; no restart is attempted afterwards."""
         broken = self._recovery.active
         await self._forget()
         try:
             await self._host.call({"op": "stop"}, _STOP_S)
         except LinkLost:
-            # Nothing is exchanged any more: the drives' watchdogs have stopped them.
+            # The exchange has already ended: the drives' watchdogs have stopped them.
             if not broken:
                 raise
         finally:
             self.shut_down()
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
-        """Begin trajectories together; returns the cycle counter of their first value.
+        """Start trajectories together; return the cycle number of their first value.
 
         Raises:
             OutOfRange: a value does not fit its object or the envelope; nothing moves.
-            NotAllowed: not enabled, not mapped, a limit that cannot be watched, or a jump.
+            NotAllowed: not enabled, not mapped, a limit that cannot be monitored, or a jump.
         """
         return await self._play(trajectories, None)
 
@@ -211,7 +212,7 @@ class EthercatCyclic:
         return number
 
     async def renew(self, station: int) -> None:
-        """Extend the life of the setpoints of ``station`` by its renewal time.
+        """Extend the validity of the setpoints of ``station`` by its renewal time.
 
         Raises:
             LinkLost: the exchange broke off meanwhile; the motion ended with it.
@@ -240,11 +241,11 @@ class EthercatCyclic:
         return unsubscribe
 
     def newest(self, channels: Sequence[str], within_s: float) -> dict[str, int | float]:
-        """Raw values of the last cycle, see `drivers.link.Cyclic`."""
+        """Return the raw values of the last cycle, see `drivers.link.Cyclic`."""
         sample = None if self._reader is None or not self.running else self._reader.newest()
         if sample is None or not int(sample["flags"][0]) & VALID:
             return {}
-        # In lockstep the grid is not that of the clock: nothing is known of a sample's age then.
+        # In lockstep the grid differs from real time, so the age of a sample is unknown.
         if abs(time.monotonic_ns() - int(sample["time_ns"][0])) > within_s * 1e9:
             return {}
         lost = {name for _, names in self._lost_in(sample) for name in names}
@@ -258,13 +259,13 @@ class EthercatCyclic:
 
     @property
     def running(self) -> bool:
-        """Whether process data are exchanged."""
+        """Whether process data are being exchanged."""
         return self._draining is not None and not self._draining.done()
 
     async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
-        """Head for a power state; the axis brakes before it leaves Operation enabled.
+        """Request a power state; the axis brakes before it leaves Operation enabled.
 
-        Returns at once; `axis_state` shows when it is there.
+        Returns at once; `axis_state` shows when the state is reached.
 
         Raises:
             NotAllowed: the drive has a fault, or its control word is not mapped.
@@ -280,7 +281,7 @@ class EthercatCyclic:
         )
 
     def axis_state(self, station: int) -> LoopState:
-        """Power state, phase of the setpoints, and why the last motion was ended by force."""
+        """Return power state, phase of the setpoints, and why the last motion was halted."""
         reported = self._status.get("axes", {}).get(station)
         if not reported:
             return LoopState(State.UNKNOWN.value, Phase.IDLE.value, None)
@@ -288,11 +289,12 @@ class EthercatCyclic:
         return LoopState(reported["state"], reported["phase"], halt)
 
     async def run(self, trajectories: Sequence[Trajectory]) -> int:
-        """Play and renew until all values are out; cancelling brakes the axes.
+        """Play and renew until all values have been sent; cancelling brakes the axes.
 
         Raises:
             NotAllowed: as `play`.
-            MotionHalted: the loop ended the motion; `MotionHalted.halt` is why.
+            MotionHalted: the loop ended the motion; `MotionHalted.halt` is the cause.
+            LinkTimeout: the motion did not end in time.
         """
         number = await self.play(trajectories)
         stations = {trajectory.station for trajectory in trajectories}
@@ -313,29 +315,29 @@ class EthercatCyclic:
 
     @property
     def stations(self) -> tuple[int, ...]:
-        """Whose process data are exchanged."""
+        """Stations whose process data are exchanged."""
         return tuple(plan.station for plan in self._plans)
 
     @property
     def trouble(self) -> Text | None:
-        """Why the exchange does not run although it is wanted; else None."""
+        """Why the exchange does not run although it is requested; None otherwise."""
         return self._recovery.trouble
 
     def update(self, status: Message, *, reachable: bool) -> None:
-        """Newest figures of the loop, from the host; ``reachable``: the interface is open."""
+        """Store the newest figures of the loop; ``reachable``: the interface is open."""
         self._status = status
         if self._wanted and reachable and not status["running"] and not self._recovery.active:
             self._broke_off(text("event.exchange-ended-by-itself"))
 
     def host_gone(self, why: Text) -> None:
-        """The host ended: so did the exchange."""
+        """Handle the end of the host process, which ends the exchange."""
         if self._wanted and not self._recovery.active:
             self._broke_off(why)
         else:
             self.shut_down()
 
     async def close(self) -> None:
-        """The bus is being closed: nothing is wanted any more."""
+        """End the exchange because the bus is being closed."""
         await self._forget()
         self.shut_down()
 
@@ -370,12 +372,12 @@ class EthercatCyclic:
         self._recovery.begin(why)
 
     async def _set_up_again(self) -> None:
-        """As `configure` and `start`, with the very same drives; they all end up disabled."""
+        """Repeat `configure` and `start` with the same drives; all of them end up disabled."""
         await self._host.call(self._setup, _CONFIGURE_S)
         try:
             await self._start()
         except LinkTimeout:
-            # It may run by now; the next attempt could not search the segment then.
+            # It may be running by now, and the next attempt could then not search the segment.
             with contextlib.suppress(DriveError):
                 await self._host.call({"op": "stop"}, _STOP_S)
             raise
@@ -399,7 +401,7 @@ class EthercatCyclic:
                 await asyncio.shield(self.halt(station))
 
     def _playing(self, stations: Iterable[int]) -> bool:
-        """Whether values are still to come: a busy computer plays them later."""
+        """Return whether values are still to come: a busy computer plays them later."""
         return any(self.axis_state(n).phase == Phase.PLAYING.value for n in stations)
 
     def _raise_if_halted(self, station: int) -> None:
@@ -439,7 +441,7 @@ class EthercatCyclic:
                 for part in contiguous(taken):
                     first = int(part["cycle"][0])
                     if expected >= 0:
-                        # Overwritten ones are among them, and what the bus left out between them.
+                        # Includes overwritten samples and those that the bus skipped between them.
                         dropped = max(first - expected, 0)
                     else:
                         before = self._missed(int(part["time_ns"][0])) if self._last_ns else 0
@@ -451,7 +453,7 @@ class EthercatCyclic:
             reader.release()
 
     def _lost_in(self, part: npt.NDArray[np.void]) -> list[tuple[npt.NDArray[np.bool_], list[str]]]:
-        """Rows in which a station was lost, each with the inputs of that station."""
+        """Return the rows in which a station was lost, each with the inputs of that station."""
         if not (part["flags"] >> 8).any():
             return []
         found = []
@@ -468,7 +470,7 @@ class EthercatCyclic:
         return found
 
     def _missed(self, first_ns: int) -> int:
-        """Cycles between the end of an exchange that broke off and the beginning of the next."""
+        """Return the cycles between the end of a broken-off exchange and the start of the next."""
         return max(round((first_ns - self._last_ns) / (self._cycle_s * 1e9)) - 1, 0)
 
     def _deliver(self, names: tuple[str, ...], part: npt.NDArray[np.void], dropped: int) -> None:

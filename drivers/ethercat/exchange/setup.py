@@ -1,7 +1,7 @@
-"""Bringing a slave from PREOP to process data, and back there after a power cycle.
+"""Bringing a slave from PREOP to process data, and back to them after a power cycle.
 
-Transactions of steps; no I/O. Sources: ETG.1000.6 clause 5.6.7 (PDO assignment), ETG.1020
-clause 22 (sync parameters), ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers) and 6.8 (DC).
+Transactions of steps; no I/O. Sources: ETG.1000.6 clause 5.6.7 (PDO assignment), ETG.1020 clause 22
+(sync parameters), ETG.1000.4 clauses 6.3 (watchdog), 6.7 (sync managers) and 6.8 (DC).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _MANAGERS, _OUTPUTS, _SM_WATCHDOG = 4, 0x04, 0x40
 """Control byte of a sync manager (ETG.1000.4 clause 6.7): three buffers, written by the master."""
 
 _PROCESS_MEMORY = 0x1000
-"""Registers end there (ETG.1000.4 clause 6.1)."""
+"""End of the registers (ETG.1000.4 clause 6.1)."""
 
 _DC_SYSTEM_TIME, _DC_OFFSET, _DC_DELAY = 0x910, 0x920, 0x928
 _DC_CONTROL, _DC_ACTIVATE, _DC_START, _DC_CYCLE, _DC_SYNC1 = 0x980, 0x981, 0x990, 0x9A0, 0x9A4
@@ -50,7 +50,7 @@ _SYNC1_BIT, _SYNC_TRY_S = 0x0400, 3.0
 
 @dataclass(frozen=True, slots=True)
 class StationSetup:
-    """Process data of one station as the server chose them; ``dc``: the segment has a clock."""
+    """Process data of one station as chosen by the server; ``dc``: the segment has a clock."""
 
     rx: Assigned
     tx: Assigned
@@ -61,18 +61,18 @@ class StationSetup:
 
     @property
     def bring_up(self) -> StationBringUp:
-        """What its file prescribes; the usual where there is none."""
+        """What the manufacturer's file prescribes, or the defaults without one."""
         return self.rules or StationBringUp(sync0_cycle_ns=self.cycle_ns)
 
     @property
     def sync0(self) -> bool:
-        """Whether the drive gets SYNC0; otherwise its outputs are valid when they arrive."""
+        """Whether the drive gets SYNC0; otherwise its outputs take effect when they arrive."""
         return self.dc and self.bring_up.activate != 0
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Registers of a slave that is set up, to set it up again after a power cycle."""
+    """Registers of a configured slave, to configure it again after a power cycle."""
 
     fmmu: bytes
     sync_managers: bytes
@@ -80,10 +80,10 @@ class Snapshot:
 
 
 def spare(station: Station) -> Steps[None]:
-    """Take a slave out of the process data: SOEM has given FMMUs to everyone.
+    """Take a slave out of the process data: SOEM assigns FMMUs to every slave.
 
-    Otherwise one that nobody uses may count in the working counter, as its controller likes, and
-    hide another one that is missing.
+    Otherwise an unused slave may or may not count in the working counter, depending on its
+    controller, and hide that another one is missing.
     """
     count = yield from read_again(_FMMU_COUNT, 1)
     if count is None:
@@ -97,7 +97,7 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
     """Write mapping, assignment, cycle time and synchronisation of a slave in PREOP.
 
     Raises:
-        NotAllowed: the drive refuses the mapping; the message says which object and why.
+        NotAllowed: the drive refuses the mapping; the message states which object and why.
     """
     yield from send_commands(station, setup.bring_up, BEFORE_MAPPING)
     assign = yield from _assignments(station)
@@ -130,7 +130,8 @@ def write_mapping(station: Station, setup: StationSetup) -> Steps[None]:
         try:
             yield from coe.download(station.box, index, sub, data)
         except Rejected:
-            # Many drives have these read-only or not at all and follow SYNC0 by themselves.
+            # Many drives have these read-only or not at all, and synchronise to SYNC0 by
+            # themselves.
             continue
 
 
@@ -147,7 +148,7 @@ def _write_assigned(station: Station, assign: int, assigned: Assigned) -> Steps[
         try:
             yield from _write_contents(station, pdo)
         except Rejected:
-            # Its mapping is fixed: nothing has changed but the assignment, which is restored.
+            # Its mapping is fixed: only the assignment has changed, and is restored.
             if assigned.assign:
                 yield from coe.download(box, assign, 0, before[:1])
             raise
@@ -168,10 +169,10 @@ def _write_contents(station: Station, pdo: Pdo) -> Steps[None]:
 
 
 def _assignments(station: Station) -> Steps[dict[str, int]]:
-    """Which object assigns outputs and which inputs: those of their sync managers.
+    """Return the objects that assign outputs and inputs: those of their sync managers.
 
-    Usually 1C12h and 1C13h; 1C00h shows where a drive has them the other way round
-    (ETG.1000.6 clause 5.6.7.4.9: 3 is outputs, 4 is inputs).
+    Usually 1C12h and 1C13h; 1C00h shows whether a drive has them the other way round (ETG.1000.6
+    clause 5.6.7.4.9: 3 is outputs, 4 is inputs).
     """
     kinds = yield from _read_list(station, 0x1C00, 1)
     if kinds[2:4] == [4, 3]:
@@ -180,7 +181,7 @@ def _assignments(station: Station) -> Steps[dict[str, int]]:
 
 
 def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps[bool]:
-    """Whether a drive whose assignment cannot be written carries just these process data."""
+    """Return whether a drive with a fixed assignment already carries just these process data."""
     pdos = [pdo for pdo in assigned.pdos if pdo.entries]
     if (yield from _read_list(station, assign, 2)) != [pdo.index for pdo in pdos]:
         return False
@@ -192,7 +193,7 @@ def _has_them_anyway(station: Station, assign: int, assigned: Assigned) -> Steps
 
 
 def assigned_bytes(station: Station) -> Steps[int]:
-    """Bytes of all process data that a slave has mapped by itself."""
+    """Return the bytes of all process data that a slave has mapped by itself."""
     total = 0
     for assign in _ASSIGN.values():
         bits = 0
@@ -216,10 +217,11 @@ def _read_list(station: Station, index: int, size: int) -> Steps[list[int]]:
 
 
 def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[int]]:
-    """What the mapped objects hold now, so that the first cycle changes nothing.
+    """Return the present values of the mapped objects, so that the first cycle changes nothing.
 
-    A mapped torque limit or mode must not become zero because it entered the process data.
-    Setpoints start at zero; the loop lets the position follow the axis until it is enabled.
+    A mapped torque limit or mode must not become zero just because it entered the process data.
+    Setpoints start at zero; the loop makes the position setpoint follow the axis until it is
+    enabled.
     """
     values = []
     for entry in entries:
@@ -238,11 +240,11 @@ def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[in
 
 
 def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
-    """Set the process-data watchdog of the slave, have its outputs trigger it, read both back.
+    """Set the process-data watchdog of the slave, triggered by its outputs; read both back.
 
     Raises:
-        NotAllowed: the slave does not take it. No axis may then be moved over this bus, because
-            nothing would stop it when the computer dies.
+        NotAllowed: the slave does not accept it. No axis may then be moved over this bus, because
+            nothing would stop it if the computer failed.
     """
     limit_ns, of_file = setup.bring_up.watchdog_limit_ns, setup.bring_up.watchdog_divider
     milliseconds = min(setup.watchdog_ms, (limit_ns or 1 << 62) / 1e6)
@@ -264,7 +266,7 @@ def arm_watchdog(station: Station, setup: StationSetup) -> Steps[None]:
 
 
 def _watchdog_ticks(station: Station, milliseconds: float) -> Steps[int | None]:
-    """Value of 0420h by the divider that the slave holds; None where no value is near enough."""
+    """Return the value of 0420h for the slave's divider; None if it does not fit the register."""
     divider = yield from read_again(WATCHDOG_DIVIDER, 2)
     if divider is None:
         raise ProtocolError("ethercat.station-not-answer-watchdog", station=station.number)
@@ -274,9 +276,9 @@ def _watchdog_ticks(station: Station, milliseconds: float) -> Steps[int | None]:
 
 
 def _watch_outputs() -> Steps[int]:
-    """Have every sync manager of outputs trigger the watchdog, usually number 2.
+    """Make every sync manager of outputs trigger the watchdog, usually number 2.
 
-    Returns how many do; 0 when one of them does not take it.
+    Return their number; 0 if one of them does not accept it.
     """
     managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
     watching = 0
@@ -305,15 +307,15 @@ _NOT_MOVED = (
 
 
 class FoundInPart(ProtocolError):
-    """The EEPROM shows what the search did not learn: one of its frames was lost or late."""
+    """The EEPROM states more than the search learned: one of its frames was lost or late."""
 
 
 def check_places(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
-    """The process data lie in the slave's process memory, as its EEPROM must show.
+    """Check that the process data lie in the slave's process memory, as its EEPROM must state.
 
     Raises:
-        NotAllowed: they do not; outputs would be written nowhere, or into registers.
-        FoundInPart: its EEPROM shows, but the search has not read it.
+        NotAllowed: they do not; outputs would be lost, or be written to registers.
+        FoundInPart: the EEPROM states it, but the search has not read it.
     """
     managers = yield from read_again(SYNC_MANAGERS, 8 * _MANAGERS)
     if managers is None:
@@ -334,7 +336,7 @@ def check_places(station: Station, setup: StationSetup, clock: Callable[[], floa
 
 
 def take_snapshot() -> Steps[Snapshot]:
-    """Registers that a power cycle clears."""
+    """Read the registers that a power cycle clears."""
     fmmu = yield from read_again(FMMU, 48)
     managers = yield from read_again(SYNC_MANAGERS, 32)
     delay = yield from read_again(_DC_DELAY, 4)
@@ -344,7 +346,7 @@ def take_snapshot() -> Steps[Snapshot]:
 
 
 def restore_mailbox(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[None]:
-    """From INIT to PREOP with the mailboxes as before."""
+    """Go from INIT to PREOP with the previous mailbox settings."""
     yield from change_state(station, AlState.INIT, clock)
     for number in (0, 1):
         yield Write(SYNC_MANAGERS + 8 * number, managers[8 * number : 8 * number + 8])
@@ -359,10 +361,10 @@ def restore(
     dc_time: Callable[[], int],
     clock: Callable[[], float],
 ) -> Steps[None]:
-    """From whatever state back to SAFEOP with all that a power cycle cleared.
+    """Go from any state back to SAFEOP, restoring all that a power cycle cleared.
 
     Raises:
-        DriveError: the slave does not follow; the reason as text.
+        DriveError: the slave does not follow; the message states why.
     """
     yield from restore_mailbox(station, snapshot.sync_managers, clock)
     yield from write_mapping(station, setup)
@@ -381,21 +383,22 @@ def restore(
 def to_safeop(
     station: Station, setup: StationSetup | None, clock: Callable[[], float]
 ) -> Steps[None]:
-    """To SAFEOP in the time that the drive's file allows."""
+    """Go to SAFEOP within the time that the drive's file allows."""
     rules = None if setup is None else setup.rules
     limit_s = timeout_s(rules, STATE_TIMEOUT_S[AlState.SAFEOP])
     yield from change_state(station, AlState.SAFEOP, clock, limit_s)
 
 
 def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float]) -> Steps[None]:
-    """Start SYNC0 on the grid of the distributed clock, and see that it was in time.
+    """Start SYNC0 on the grid of the distributed clock, and check that it was in time.
 
-    A start that has passed when it is activated comes only after the clock has wrapped (ETG.1000.4
-    clause 6.7.3), and the drive then refuses OP: a lost frame or a pause of this computer must not
-    do that. Where the drive gets no SYNC0, that of an earlier exchange is stopped.
+    If the start time has passed at activation, SYNC0 comes only after the clock has wrapped
+    (ETG.1000.4 clause 6.7.3), and the drive then refuses OP: a lost frame or a pause of this
+    computer must not cause that. If the drive gets no SYNC0, that of an earlier exchange is
+    stopped.
 
     Raises:
-        LinkLost: frames are lost again and again.
+        LinkLost: frames are lost repeatedly.
     """
     deadline = clock() + _SYNC_TRY_S
     while not (yield from _sync0_started(setup)):
@@ -404,7 +407,7 @@ def start_sync0(station: Station, setup: StationSetup, clock: Callable[[], float
 
 
 def _sync0_started(setup: StationSetup) -> Steps[bool]:
-    """One try; False where a frame was lost, or the start had passed before it was activated."""
+    """Try once; False if a frame was lost, or the start time passed before the activation."""
     rules = setup.bring_up
     stopped = yield Write(_DC_ACTIVATE, b"\0")
     assigned = yield Write(_DC_CONTROL, bytes([rules.activate & 0xFF]))
@@ -414,7 +417,7 @@ def _sync0_started(setup: StationSetup) -> Steps[bool]:
     if here is None or stopped is None:
         return False
     start_ns = _sync_start(int.from_bytes(here, "little"), setup)
-    # What 990h holds cannot be read back: chips show the next pulse there.
+    # 990h cannot be read back: some chips show the next pulse there.
     written = []
     if rules.activate & _SYNC1_BIT:
         written.append((yield Write(_DC_SYNC1, struct.pack("<I", rules.sync1_ns))))
@@ -432,13 +435,13 @@ def _sync0_started(setup: StationSetup) -> Steps[bool]:
 
 
 def _sync_start(now_ns: int, setup: StationSetup) -> int:
-    """Whole multiples of the cycle, which all stations share, and the drive's own shift."""
+    """Return a multiple of the cycle, shared by all stations, plus the drive's own shift [ns]."""
     grid_ns = (now_ns + _SYNC_LEAD_NS) // setup.cycle_ns * setup.cycle_ns
     return grid_ns + setup.bring_up.sync0_shift_ns
 
 
 def _restore_clock(snapshot: Snapshot, dc_time: Callable[[], int]) -> Steps[None]:
-    """Shift the restarted clock to the reference clock; the cyclic frames do the rest."""
+    """Shift the restarted clock to the reference clock; the cyclic frames correct the rest."""
     yield Write(_DC_ACTIVATE, b"\0")
     yield Write(_DC_DELAY, snapshot.dc_delay)
     offset = yield Read(_DC_OFFSET, 8)

@@ -1,4 +1,4 @@
-"""Trajectories on their way to the host process, checked before anything moves."""
+"""Messages with trajectories for the host process, checked before anything moves."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from drivers.motion.setpoints import longest_step, require_fits, require_within_
 
 
 def message_of(trajectory: Trajectory) -> Message:
-    """What the host process is informed of a trajectory.
+    """Check a trajectory and convert it to a message for the host process.
 
     Raises:
-        NotAllowed: no setpoint for cyclic motion.
+        NotAllowed: the target is not a setpoint of cyclic motion.
         OutOfRange: a value does not fit its object or the envelope.
     """
     require_fits(trajectory)

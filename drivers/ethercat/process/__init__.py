@@ -1,4 +1,4 @@
-"""The process of one segment: what it does, and how the server starts and asks it."""
+"""The host process of one segment: its operations, and how the server starts and calls it."""
 
 from drivers.computer.packet_capture import find_library
 

@@ -1,7 +1,7 @@
-"""The channel of messages between server and host process, at both of its ends.
+"""Both ends of the message channel between server and host process.
 
 On Linux a pair of sockets that the child inherits. Elsewhere its standard input and output, which
-every system can hand to a child; there nothing but a thread can wait for them.
+every system can pass to a child; there, only a thread can wait for them.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from typing import Protocol
 
 _PIECE = 1 << 18
 _LAST_S = 2.0
-"""For what is still to be sent at the end."""
+"""Time for sending what is still queued at the end [s]."""
 
 
 class HostEnd(Protocol):
-    """The host's end: nothing of it ever waits, except `wait`."""
+    """The host's end: none of its methods waits, except `wait`."""
 
     def wait(self, timeout_s: float) -> None:
-        """Return when something came, or after this time."""
+        """Return when data have arrived, or after this time."""
 
     def receive(self) -> bytes | None:
-        """What came; None where nothing did, ``b""`` once the server's end is closed."""
+        """Return the data received; None without data, ``b""`` once the server's end is closed."""
 
     def send(self, data: bytearray) -> int | None:
-        """Bytes that were accepted; None once the server's end is closed."""
+        """Return the number of bytes accepted; None once the server's end is closed."""
 
     def close(self) -> None:
-        """Let what was accepted go out, and end."""
+        """Send what was accepted, and end."""
 
 
 class SocketHostEnd:
@@ -86,7 +86,7 @@ class PipeHostEnd:
 
     @classmethod
     def of_this_process(cls) -> PipeHostEnd:
-        """Standard input and output. What is printed from now on goes to the error output."""
+        """Use standard input and output; later printed output goes to standard error."""
         sink = os.dup(1)
         os.dup2(2, 1)
         return cls(0, sink)
@@ -97,7 +97,7 @@ class PipeHostEnd:
 
     def receive(self) -> bytes | None:
         """See `HostEnd`."""
-        # Cleared before the look: what comes in between is seen now or signalled again.
+        # Cleared before the check: data arriving in between are seen now or signalled again.
         self._signal.clear()
         if not self._came:
             return b"" if self._ended else None
@@ -148,7 +148,7 @@ class ServerEnd(Protocol):
     """The server's end, on its event loop."""
 
     async def receive(self) -> bytes:
-        """What came; ``b""`` once the child's end is closed."""
+        """Return the data received; ``b""`` once the child's end is closed."""
 
     async def send(self, data: bytes) -> None:
         """Send all of it.
@@ -158,7 +158,7 @@ class ServerEnd(Protocol):
         """
 
     def close(self) -> None:
-        """Close it, which has the child end. Calling again does nothing."""
+        """Close it, which makes the child end. Further calls have no effect."""
 
 
 class SocketServerEnd:

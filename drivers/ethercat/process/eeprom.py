@@ -1,4 +1,4 @@
-"""The EEPROM of a station, as the server asks for it: read, and write what was planned."""
+"""EEPROM operations of the host process: read, and write what was planned."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CALM = (AlState.INIT, AlState.PREOP)
 
 
 class EepromOperations:
-    """Operations on whole EEPROMs. While one is written no search touches the segment."""
+    """Operations on whole EEPROMs. While one is written, no search may access the segment."""
 
     def __init__(self, roster: Roster, lanes: Lanes, progress: Callable[[Message], Report]) -> None:
         self._roster = roster
@@ -26,17 +26,17 @@ class EepromOperations:
         self._progress = progress
 
     def read(self, message: Message, done: Done) -> None:
-        """Contents as bytes.
+        """Read the contents as bytes.
 
         Raises:
-            Busy: the cyclic exchange runs.
+            Busy: the cyclic exchange runs, or an EEPROM is being written.
         """
         station = self._calm(message)
         steps = read_image(time.monotonic, self._progress(message), message["size"])
         self._lanes.submit(station.number, "register", steps, done)
 
     def write(self, message: Message, done: Done) -> None:
-        """From the contents ``present`` to ``target``.
+        """Write the change from the contents ``present`` to ``target``.
 
         Raises:
             Busy: the cyclic exchange runs, or an EEPROM is being written.
@@ -63,10 +63,11 @@ class EepromOperations:
 
 
 def _written(station: Station, present: bytes, target: bytes, report: Report) -> Steps[None]:
-    """Write where the state of the drive permits it.
+    """Write if the state of the drive permits it.
 
     Raises:
-        NotAllowed: it is in a state in which its processor may use the EEPROM, or moves.
+        NotAllowed: the drive is in a state in which its processor may use the EEPROM.
+        LinkLost: the station does not answer.
     """
     if not (yield from answers(station, time.monotonic)):
         raise LinkLost("ethercat.station-not-answer-check-supply")

@@ -1,4 +1,4 @@
-"""Reading of a station whatever shows why it does not reach Operational.
+"""Reading of everything in a station that shows why it does not reach Operational.
 
 Source: ETG.1000.4 clause 6 (registers), ETG.1020 clause 22 (1C32h, 1C33h).
 """
@@ -21,7 +21,7 @@ _ASSIGN = (("outputs", 0x1C12), ("inputs", 0x1C13))
 
 
 def examine(station: Station, setup: StationSetup | None) -> Steps[Message]:
-    """Facts by the names of `drivers.doctor.evidence.Evidence`; ``setup`` is what was planned."""
+    """Read facts, named as in `drivers.doctor.evidence.Evidence`; ``setup`` is what was planned."""
     found: Message = {"station": station.number, "answers": (yield from al_status(station))}
     found |= {"al": station.al_state, "al_code": station.al_code, "alias": station.alias}
     if not found["answers"]:
@@ -99,7 +99,7 @@ def _objects(station: Station, found: Message) -> Steps[None]:
             bits += sum(word & 0xFF for word in (yield from _list(station, pdo)) or ())
         found[name] = (bits + 7) // 8
     found["assigned"] = assigned
-    # By the EEPROM, as a search recognises the drive; 1018h can be of another firmware.
+    # Identity from the EEPROM, as used by a search; 1018h may belong to other firmware.
     for key, subindex, known in (
         ("vendor", 1, station.vendor_id),
         ("product", 2, station.product_code),

@@ -1,7 +1,7 @@
-"""Loading firmware: to BOOT and back where the drive has that state, in PREOP where it has not.
+"""Firmware download: in BOOT if the drive has that state, otherwise in PREOP.
 
 Source: ETG.1000.6 clauses 6.4 (BOOT) and 5.8 (FoE), ETG.5003-2 (firmware update): INIT, mailboxes
-as the EEPROM gives them for BOOT, BOOT, the file, INIT, and up again.
+as the EEPROM states them for BOOT, BOOT, the file, INIT, and up again.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ def load(
     clock: Callable[[], float],
     report: Report,
 ) -> Steps[str]:
-    """Send a file and bring the drive back to PREOP; returns the state in which it was taken.
+    """Send a file and bring the drive back to PREOP; return the state in which it was accepted.
 
-    ``managers`` are the registers of sync managers 0 and 1 for PREOP. "auto" means BOOT where the
-    EEPROM names mailboxes for it.
+    ``managers`` are the registers of sync managers 0 and 1 for PREOP. "auto" means BOOT if the
+    EEPROM states mailboxes for it.
 
     Raises:
-        Rejected, NotAllowed: the drive refused, as text; it is back in PREOP if it can be.
-        LinkTimeout, LinkLost: the transfer broke off; the message says how far it came.
+        Rejected, NotAllowed: the drive refused, as text; it is back in PREOP if possible.
+        LinkTimeout, LinkLost: the transfer broke off; the message states how far it got.
     """
     boot = yield from sii.boot_mailbox(clock)
     if where == "BOOT" and boot is None:
@@ -73,7 +73,7 @@ def _enter_boot(
     report: Report,
     where: Where,
 ) -> Steps[bool]:
-    """False where the drive has no BOOT after all, and is in PREOP again."""
+    """Enter BOOT; return False if the drive has no BOOT after all and is in PREOP again."""
     report(0.0, text("ethercat.going-boot"))
     yield from change_state(station, AlState.INIT, clock)
     for number, (address, size, control) in enumerate(
@@ -118,7 +118,7 @@ def _in_boot(
 
 
 def _after_failure(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[Text]:
-    """Try to bring the drive back; what the user must know of how that went."""
+    """Try to bring the drive back; return a message with the result for the user."""
     try:
         yield from restore_mailbox(station, managers, clock)
     except DriveError as error:
@@ -127,7 +127,7 @@ def _after_failure(station: Station, managers: bytes, clock: Callable[[], float]
 
 
 def _back(station: Station, managers: bytes, clock: Callable[[], float]) -> Steps[None]:
-    """Up again; a drive that restarts with its new firmware is away for a while.
+    """Bring the drive up again; one that restarts with its new firmware is away for a while.
 
     Raises:
         LinkLost: it did not come back within a minute.

@@ -1,11 +1,11 @@
 """The process that owns one EtherCAT segment: `python -m drivers.ethercat.process.host IFACE …`.
 
 One thread does everything on the wire. While process data are exchanged it follows the grid and
-uses what is left of each cycle for mailbox frames and commands; otherwise it works through
-transactions as fast as the slaves answer. The server may kill it at any time: pysoem holds the
-interpreter lock in many calls, and this way only this process hangs with it.
+uses the rest of each cycle for mailbox frames and commands; otherwise it works through transactions
+as fast as the slaves answer. The server may kill it at any time: pysoem holds the interpreter lock
+in many calls, and in a separate process only that process hangs with it.
 
-It ends by itself when the server's end of the pipe closes: axes are braked first. Should even
+It ends by itself when the server's end of the channel closes, after braking the axes. Should even
 that hang, the slaves' watchdogs stop the axes and an alarm ends the process.
 """
 
@@ -42,7 +42,7 @@ _SILENT = Halted(
 
 
 class Host:
-    """Commands in, replies and events out, and the loop that never waits for either."""
+    """Receives commands, sends replies and events, and runs the loop, which waits for neither."""
 
     def __init__(
         self, interface: str, control: HostEnd, ring: Ring, *, raw_frames: bool = True
@@ -59,7 +59,7 @@ class Host:
         self.operations.roster.exchange.end_set_up_when(self._stop_waits)
 
     def run(self, granted: realtime.RealTime) -> None:
-        """Until the server goes away."""
+        """Run until the server is gone."""
         self.operations.granted = granted
         try:
             self.operations.open()
@@ -145,11 +145,11 @@ class Host:
         except DriveError as error:
             done(None, error)
         except (KeyError, TypeError, ValueError, struct.error) as error:
-            # A wrong request must not end the process that moves axes.
+            # An invalid request must not end the process that moves axes.
             done(None, ProtocolError("ethercat.request-cannot-carried-out", cause=str(error)))
 
     def send(self, message: Message) -> None:
-        """Queue a message; a slow server never holds up the wire."""
+        """Queue a message; a slow server never delays the wire."""
         self._outgoing += protocol.pack(message)
 
     def _flush(self) -> None:
@@ -162,7 +162,7 @@ class Host:
         del self._outgoing[:sent]
 
     def orphan(self) -> None:
-        """SIGTERM: end in good order."""
+        """Handle SIGTERM: end in an orderly way."""
         end_within(_LAST_WORDS_S)
         self._orphaned = True
 
@@ -190,7 +190,7 @@ def main(argv: list[str] | None = None) -> int:
     host = Host(options.interface, control, memory, raw_frames=not options.library_frames)
     if options.lockstep:
         host.operations.roster.exchange.lockstep = options.lockstep
-        # A virtual segment on a busy computer answers when it gets its turn.
+        # A virtual segment on a busy computer answers only when it is scheduled.
         host.operations.segment.frame_timeout_us = _PATIENT_FRAME_US
     signals.on_termination(host.orphan)
     granted = realtime.claim(wanted=not options.no_realtime)

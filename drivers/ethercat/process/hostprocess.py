@@ -1,4 +1,4 @@
-"""Starting, watching, killing and restarting the host process. Runs on the event loop."""
+"""Start, supervision, killing and restart of the host process. Runs on the event loop."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ _WATCH_S = 0.1
 _RESTART_PAUSE_S = (0.2, 1.0, 3.0, 10.0)
 _FAREWELL_S = 3.0
 _PIPE_LIMIT = 1 << 20
-"""Bytes of a child's messages that are held for the server before the child has to wait."""
+"""Bytes of a child's messages buffered for the server before the child has to wait."""
 START_S = 30.0
-"""A child that hangs as it starts; one that dies is noticed at once. Loading alone takes a busy
-computer ten seconds, and a shorter time would have it begin again for ever."""
+"""Time-out [s] for a child that hangs while starting; one that dies is detected at once. Loading
+alone takes ten seconds on a busy computer, and a shorter time would restart it endlessly.
+"""
 
 
 class HostProcess:
-    """One child; ``received`` gets its events, ``restarted`` the reason of every restart."""
+    """One child; ``received`` receives its events, ``restarted`` the reason of every restart."""
 
     def __init__(
         self,
@@ -44,7 +45,7 @@ class HostProcess:
         *,
         raw_frames: bool = True,
     ) -> None:
-        """Without ``raw_frames`` the child inherits no descriptors, as on other systems."""
+        """Store the options. Without ``raw_frames`` the child inherits no descriptors."""
         self._options = tuple(options)
         self._raw_frames = raw_frames
         self._ring_file: Path | None = None
@@ -67,7 +68,7 @@ class HostProcess:
 
     @property
     def running(self) -> bool:
-        """Whether the child lives and has opened its interface."""
+        """Whether the child runs and has opened its interface."""
         return (
             self._process is not None
             and self._process.returncode is None
@@ -99,7 +100,7 @@ class HostProcess:
         self._care = asyncio.get_running_loop().create_task(self._look_after())
 
     async def stop(self) -> None:
-        """End the child in good order, by force after some seconds."""
+        """End the child in an orderly way, by force after some seconds."""
         self._wanted = False
         if self._care is not None:
             self._care.cancel()
@@ -115,9 +116,9 @@ class HostProcess:
         """Send a request and wait for its reply.
 
         Raises:
-            LinkLost: the child is not there, or went away meanwhile.
+            LinkLost: the child does not run, or ended meanwhile.
             LinkTimeout: no reply in time.
-            DriveError: what the child says.
+            DriveError: the error that the child reports.
         """
         if not self.running or self._channel is None:
             raise LinkLost(
@@ -127,8 +128,8 @@ class HostProcess:
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (future, progress)
         try:
-            # A message that was cut off would swallow those after it, a halt among them: who gives
-            # up waiting (STOP cancels a motion) leaves it to be sent whole.
+            # A truncated message would corrupt those after it, a halt among them: when the caller
+            # gives up waiting (STOP cancels a motion), the message is still sent completely.
             sending = asyncio.create_task(self._write(protocol.pack(message | {"id": number})))
             sending.add_done_callback(_noticed)
             await asyncio.shield(sending)
@@ -141,7 +142,8 @@ class HostProcess:
         finally:
             self._waiting.pop(number, None)
             if future.done() and not future.cancelled():
-                # Whoever waited has the error: this one, or what kept the request from being sent.
+                # Marks the error as retrieved: the caller already has this one, or the one that
+                # prevented sending.
                 future.exception()
 
     async def _spawn(self, timeout_s: float = START_S) -> None:
@@ -149,7 +151,7 @@ class HostProcess:
         try:
             ours = await self._launch()
         except OSError as error:
-            # No memory, no file descriptor, no process to be had: all of that may pass.
+            # No memory, file descriptor or process available: all of these may be temporary.
             raise LinkLost(
                 "ethercat.ethercat-process-cannot-started",
                 interface=self._interface,
@@ -171,11 +173,11 @@ class HostProcess:
         self.why, self._opened = text("ethercat.process-open"), True
 
     async def _launch(self) -> ServerEnd:
-        """Start the child; our end of its control channel. Raises OSError, with nothing left."""
+        """Start the child and return our end of its channel. Raises OSError after cleaning up."""
         return await (self._launch_inheriting() if self._raw_frames else self._launch_portably())
 
     async def _launch_portably(self) -> ServerEnd:
-        """Messages by the child's standard input and output, samples through a file."""
+        """Use the child's standard input and output for messages, and a file for samples."""
         self._ring_file = path = Ring.create_file()
         self.ring = Ring.of_file(path)
         self._process = process = await asyncio.create_subprocess_exec(
@@ -189,7 +191,7 @@ class HostProcess:
         return PipeServerEnd(process.stdout, process.stdin)
 
     async def _launch_inheriting(self) -> ServerEnd:
-        """A pair of sockets and a file in memory, both inherited."""
+        """Use a pair of sockets and a memory file, both inherited."""
         ours, theirs = socket.socketpair()
         try:
             with theirs:
@@ -221,7 +223,7 @@ class HostProcess:
                 for message in unpacker.feed(data):
                     self._take(message)
             except (DriveError, ValueError, KeyError, TypeError) as error:
-                # Not our language any more: the child is replaced.
+                # The protocol is violated: the child is replaced.
                 self._gone(text("ethercat.process-unreadable", cause=why_of(error)))
                 if self._process is not None and self._process.returncode is None:
                     self._process.kill()
@@ -277,7 +279,7 @@ class HostProcess:
                 raise LinkLost("ethercat.ethercat-process-ended") from error
 
     async def _look_after(self) -> None:
-        """Give signs of life, and replace a child that died or hangs."""
+        """Send keep-alives, and replace a child that died or hangs."""
         while True:
             await asyncio.sleep(_WATCH_S)
             ring, process = self.ring, self._process
@@ -317,7 +319,7 @@ class HostProcess:
     async def _end(self, *, kill: bool) -> None:
         process, self._process = self._process, None
         if self._channel is not None:
-            # The end of the pipe is what makes the child brake its axes and leave.
+            # Closing the channel makes the child brake its axes and end.
             self._hang_up()
         if process is not None and process.returncode is None:
             if kill:
@@ -346,13 +348,13 @@ class HostProcess:
             ring.close()
         path, self._ring_file = self._ring_file, None
         if path is not None:
-            # Windows removes no file that a reader still looks at; it is a temporary one.
+            # Windows cannot remove a file that a reader still uses; it is a temporary one.
             with contextlib.suppress(OSError):
                 path.unlink()
 
 
 def _noticed(sending: asyncio.Task[None]) -> None:
-    """Whoever waits hears of a failure; where nobody waits any more, it is no matter."""
+    """Retrieve the error: a waiting caller gets it anyway, and without one it does not matter."""
     if not sending.cancelled():
         sending.exception()
 

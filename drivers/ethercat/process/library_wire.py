@@ -7,8 +7,9 @@ answer is used until probes have shown that answers match requests: each probe r
 registers with known values, chosen at random. If a probe returns the other value, old answers are
 in the queue, and only opening the adapter again helps.
 
-pysoem does not state the working counter of a register access that failed. SOEM gives a frame up
-only after the whole time-out, so an access that failed earlier came back without an answer.
+pysoem does not report the working counter of a register access that failed. SOEM gives a frame up
+only after the whole time-out, so in an access that failed earlier, the frame came back without an
+answer.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from drivers.ethercat.wire.frames import Request
 from drivers.ethercat.wire.steps import Read
 
 _SUSPICIOUS_LOSSES = 8
-"""Of the 15 in a row that would be needed: SOEM's own calls send some without our counting."""
+"""Of the 15 consecutive losses needed: SOEM's own calls send some frames that are not counted."""
 _PROBES = 20
 """A wrong match passes with a probability of 2^-20."""
 _IDENTITY, _ADDRESS = 0x0000, 0x0010
@@ -33,7 +34,7 @@ _STATION_BASE = 0x1000
 
 
 class Slave(Protocol):
-    """What is used of `pysoem.CdefSlave`."""
+    """The part of `pysoem.CdefSlave` that is used."""
 
     def _fprd(self, address: int, size: int, timeout_us: int) -> bytes: ...
 
@@ -41,7 +42,7 @@ class Slave(Protocol):
 
 
 class LibraryWire:
-    """One access after the other; see the module for when its answers are used."""
+    """Makes one access after the other; see the module docstring for when answers are used."""
 
     def __init__(
         self,
@@ -58,35 +59,35 @@ class LibraryWire:
         self.mixed_up = False
         """Old answers match new requests: the adapter has to be opened again."""
         self.silent = False
-        """The last frame of ours did not come back."""
+        """The last frame sent here did not come back."""
 
     def found(self, slaves: Sequence[Slave], patience_us: int) -> None:
-        """Slaves right after a search, with answers known to be their own."""
+        """Set the slaves right after a search, when answers are known to match."""
         self._slaves, self._patience_us = slaves, patience_us
         self._losses, self._doubted, self.mixed_up = 0, False, False
         self._identities = [self._read(slave, _IDENTITY, 2)[0] for slave in slaves]
 
     def doubt(self) -> None:
-        """A call of SOEM failed: how many of its frames were lost is not known."""
+        """Note that a call of SOEM failed, with an unknown number of lost frames."""
         self._doubted = True
 
     def count(self, *, came_back: bool) -> None:
-        """Whether a frame came back, of SOEM's process data or of ours."""
+        """Count whether a frame came back, of SOEM's process data or of ours."""
         self._losses = 0 if came_back else self._losses + 1
         self._doubted = self._doubted or self._losses >= _SUSPICIOUS_LOSSES
 
     def in_step(self, patience_us: int) -> bool:
-        """Whether answers match requests; sends probes where that is in doubt."""
+        """Return whether answers match requests; send probes if that is uncertain."""
         self._patience_us = patience_us
         if self._doubted and not self.mixed_up:
             self._doubted = not self._probed()
         return not self._doubted
 
     def exchange(self, requests: Sequence[Request], patience_us: int) -> list[bytes | None]:
-        """As `drivers.ethercat.process.segment.Segment.exchange`, a frame for each access.
+        """As `drivers.ethercat.process.segment.Segment.exchange`, with one frame for each access.
 
-        ``patience_us`` is below SOEM's own time-out, so that each frame is sent once: what is
-        written, and what was read from a mailbox, must not be asked for twice.
+        ``patience_us`` is below SOEM's own time-out, so that each frame is sent once: a write, or a
+        read from a mailbox, must not be repeated.
         """
         replies: list[bytes | None] = []
         self.silent = not self.in_step(patience_us)
@@ -107,7 +108,7 @@ class LibraryWire:
         return replies
 
     def _read(self, slave: Slave, register: int, size: int) -> tuple[bytes | None, bool]:
-        """The data, None where nobody answered; and whether the frame came back."""
+        """Return the data, None without an answer; and whether the frame came back."""
         began = self._clock()
         try:
             return bytes(slave._fprd(register, size, self._patience_us)), True  # noqa: SLF001 - its only name
@@ -126,7 +127,7 @@ class LibraryWire:
         return (self._clock() - began) * 1e6 < self._patience_us
 
     def _probed(self) -> bool:
-        """Whether `_PROBES` in a row were answered by what was asked; sets `mixed_up`."""
+        """Return whether `_PROBES` probes in a row were answered correctly; sets `mixed_up`."""
         for place, identity in enumerate(self._identities):
             address = (_STATION_BASE + place + 1).to_bytes(2, "little")
             if identity is None or identity == address:

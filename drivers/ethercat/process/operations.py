@@ -1,4 +1,4 @@
-"""What the host process can do, each operation as the server asks for it."""
+"""Operations of the host process, one for each request of the server."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ _CONTROL_WORD = (0x6040, 0)
 _MAX_STEPS_PER_CYCLE = 16
 _STARVED_CYCLES = 8
 _NS_PER_BYTE = 80
-"""100 Mbit/s: a frame may not become so long that process data wait for it."""
+"""100 Mbit/s: a frame must not become so long that process data have to wait for it."""
 _FIND_TRIES = 3
+"""Searches before lost frames, which leave the result incomplete, are reported as an error."""
 _ENDED = Halted(HaltCause.COMMANDED, note=text("ethercat.motion-ended"))
-"""A search that lost a frame has not seen everything; one that loses some each time is reported."""
 
 
 class Operations:
-    """One segment with its stations, and what can be asked of it."""
+    """One segment with its stations, and the operations on it."""
 
     def __init__(self, interface: str, ring: Ring, send: Send, *, raw_frames: bool = True) -> None:
         self.segment = Segment(interface, raw_frames=raw_frames)
@@ -79,14 +79,14 @@ class Operations:
         self.roster.open()
 
     def housekeeping(self, now: float) -> None:
-        """Look after stations and interface; see `Roster.housekeeping`."""
+        """Supervise stations and interface; see `Roster.housekeeping`."""
         self.roster.housekeeping(now)
 
     def handle(self, message: Message, done: Done) -> None:
-        """Begin an operation; ``done`` is called when it ends.
+        """Start an operation; ``done`` is called when it ends.
 
         Raises:
-            DriveError: it cannot begin.
+            DriveError: it cannot start.
         """
         handler = self._handlers.get(message["op"])
         if handler is None:
@@ -97,17 +97,17 @@ class Operations:
 
     @staticmethod
     def stops(message: Message) -> bool:
-        """Whether it writes a control word that takes the power or the speed of an axis."""
+        """Return whether it writes a control word that can only stop motion."""
         place = message["op"], message.get("index"), message.get("subindex")
         return place == ("write", *_CONTROL_WORD) and cia402.stops(_word(message["data"]))
 
     @property
     def checking(self) -> bool:
-        """Whether it is being measured how punctual this computer is."""
+        """Whether the timing of this computer is being measured."""
         return self._check is not None
 
     def check_cycle(self) -> None:
-        """One cycle of that, and one frame of whatever else is due."""
+        """Do one cycle of the timing measurement, and one frame of other work."""
         if self._check is None:
             return
         check, done = self._check
@@ -122,7 +122,7 @@ class Operations:
         self.lanes.step()
 
     def use_spare_time(self) -> None:
-        """Mailbox frames between two cycles; now and then one although there is no time."""
+        """Send mailbox frames between two cycles; occasionally one even if there is no time."""
         loop = self.loop
         if loop is None:
             return
@@ -132,7 +132,7 @@ class Operations:
                 break
             done += 1
             if self.segment.silent:
-                # Nothing comes back: process data must not wait for more of that.
+                # Frames do not come back: process data must not wait for more of them.
                 break
         self._starved = 0 if done else self._starved + 1
         if self._starved >= _STARVED_CYCLES:
@@ -377,12 +377,12 @@ class Operations:
         self.lanes.submit(station.number, "mailbox", steps, ended)
 
     def _require_parameters(self, station: Station) -> None:
-        """As `Station.require_parameters`, unless it is just being brought up."""
+        """Check as `Station.require_parameters`, unless the station is just being brought up."""
         if not self.lanes.busy(station.number, "mailbox"):
             station.require_parameters()
 
     def _calm_station(self, message: Message) -> Station:
-        """The station a message is about.
+        """Return the station addressed by a message.
 
         Raises:
             Busy: firmware is being loaded into it.
@@ -464,18 +464,18 @@ class Operations:
         done(None, None)
 
     def _report_figures(self) -> None:
-        """Before the reply, so that nobody takes the end of an earlier motion for this one's."""
+        """Send figures before the reply, so that an earlier motion's end is not mistaken for it."""
         self._send({"event": "status"} | self.status())
 
     def status(self) -> Message:
-        """The state of everything, sent several times a second."""
+        """Return the state of everything, sent several times a second."""
         return self.roster.status()
 
 
 def _require_same(
     before: Mapping[int, Sequence[int | None]] | None, now: Mapping[int, Sequence[int | None]]
 ) -> None:
-    """After a break the very same drives must be there: a swapped one has other values.
+    """Require the same drives after an interruption: a replaced one has other parameter values.
 
     Raises:
         NotAllowed: another drive answers at a station.
@@ -490,4 +490,4 @@ def _word(data: bytes) -> int:
 
 
 def _ignore(_result: object, _error: DriveError | None) -> None:
-    """For transactions that report by events."""
+    """Ignore the result of a transaction that reports by events."""

@@ -1,8 +1,9 @@
-"""Promiscuous mode for as long as a socket lives, and no longer.
+"""Promiscuous mode for the life of a socket only.
 
-SOEM sets the flag of the interface itself (IFF_PROMISC, netdevice(7)), which stays when the master
-is closed or killed: the computer then reads all traffic of that network for ever. A membership of
-the socket (PACKET_MR_PROMISC, packet(7)) does the same, and the kernel undoes it by itself.
+SOEM sets the flag of the interface itself (IFF_PROMISC, netdevice(7)), which remains when the
+master is closed or killed: the computer then reads all traffic of that network permanently. A
+membership of the socket (PACKET_MR_PROMISC, packet(7)) has the same effect, and the kernel ends it
+with the socket.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ _SOL_PACKET, _ADD_MEMBERSHIP, _MR_PROMISC = 263, 1, 1
 
 
 def is_set(interface: str) -> bool:
-    """Whether somebody has switched the interface to promiscuous mode for good."""
+    """Return whether the interface has been permanently switched to promiscuous mode."""
     try:
         return bool(interface_flags(interface) & _IFF_PROMISC)
     except OSError:
@@ -26,9 +27,9 @@ def is_set(interface: str) -> bool:
 
 
 def bind_to(packets: socket.socket, interface: str, index: int) -> None:
-    """Have the mode by this packet socket, and take it off the interface's own flags.
+    """Set the mode for this packet socket, and clear it in the interface's own flags.
 
-    Where this is not permitted, SOEM was not permitted to switch it either.
+    Where this is not permitted, SOEM was not permitted to set it either.
     """
     with contextlib.suppress(OSError):
         membership = struct.pack("iHH8s", index, _MR_PROMISC, 0, b"")

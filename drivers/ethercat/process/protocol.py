@@ -1,8 +1,8 @@
 """Messages between the server and the EtherCAT host process.
 
-A message is a msgpack map behind its length (4 bytes, little endian). Requests carry ``id`` and
-``op``; replies the same ``id`` with ``result`` or ``error``; ``progress`` may come before the
-reply; ``event`` comes unasked.
+A message is a msgpack map preceded by its length (4 bytes, little endian). Requests carry ``id``
+and ``op``; replies the same ``id`` with ``result`` or ``error``; ``progress`` may precede the
+reply; an ``event`` is sent without a request.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from drivers import errors
 from drivers.errors import DriveError, Rejected
 from drivers.texts.message import Text, Wire
 
-#: A message is a closed set of keys, but its values differ by operation: the boundary is here.
+#: Each message has a fixed set of keys, but its values differ by operation: the type check ends
+#: here.
 Message = dict[str, Any]
 
 _LENGTH = struct.Struct("<I")
@@ -24,7 +25,7 @@ MAX_MESSAGE_BYTES = 64 << 20
 
 
 class WireError(TypedDict):
-    """A `DriveError` on its way to the server."""
+    """A `DriveError` in the form in which it is sent to the server."""
 
     kind: str
     text: Wire
@@ -44,19 +45,23 @@ _KINDS: dict[str, type[DriveError]] = {
 
 
 def pack(message: Message) -> bytes:
-    """A message with its length in front."""
+    """Return a message preceded by its length."""
     body: bytes = msgpack.packb(message, use_bin_type=True)
     return _LENGTH.pack(len(body)) + body
 
 
 class Unpacker:
-    """Collects bytes and gives back whole messages."""
+    """Collects bytes and returns complete messages."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[Message]:
-        """Messages completed by ``data``."""
+        """Return the messages completed by ``data``.
+
+        Raises:
+            ProtocolError: a length above `MAX_MESSAGE_BYTES`.
+        """
         self._buffer += data
         found: list[Message] = []
         while len(self._buffer) >= 4:
@@ -74,7 +79,7 @@ class Unpacker:
 
 
 def error_to_wire(error: DriveError) -> WireError:
-    """The error as a map."""
+    """Convert the error to a map."""
     return WireError(
         kind=error.kind,
         text=error.text.to_wire(),
@@ -86,7 +91,7 @@ def error_to_wire(error: DriveError) -> WireError:
 
 
 def error_from_wire(wire: WireError) -> DriveError:
-    """The same error again, of the same class."""
+    """Convert the map to an error of the same class."""
     limit = None if wire["limit"] is None else Text.from_wire(wire["limit"])
     remedy = None if wire["remedy"] is None else Text.from_wire(wire["remedy"])
     if wire["abort_code"] is not None:

@@ -1,9 +1,9 @@
-"""Whether this computer and adapter keep a cycle: measured, kept, and judged for a cycle time.
+"""Timing check of computer and adapter: measurement, storage, and verdict for a cycle time.
 
-Without real-time scheduling and raw sockets (Windows, macOS) nothing guarantees that a frame leaves
-in time. So process data are exchanged only where a check of some seconds has shown it: the host
-wakes up every millisecond, sends one frame that reads register 0000h of a slave, and waits for it.
-A cycle is missed where waking up and the frame together take longer than the cycle.
+Without real-time scheduling and raw sockets (Windows, macOS), no frame is guaranteed to leave in
+time. Process data are therefore exchanged only after a check of some seconds: the host wakes up
+every millisecond, sends one frame that reads register 0000h of a slave, and waits for it. A cycle
+is missed if waking up and the frame together take longer than the cycle.
 """
 
 from __future__ import annotations
@@ -30,43 +30,44 @@ from drivers.ethercat.wire.steps import Read
 CHECK_S = 10.0
 PERIOD_US = 1000
 ALLOWED_MISSED = 0.001
-"""The share of missed cycles with which a frequency response keeps its accuracy; derived in
-`backend.preflight.verdicts`."""
+"""Share of missed cycles up to which a frequency response keeps its accuracy; derived in
+`backend.preflight.verdicts`.
+"""
 COARSEST_CLOCK_S = 1e-4
-"""A tenth of the shortest cycle. Before CPython 3.13 the clock of Windows has steps of 15.6 ms."""
+"""A tenth of the shortest cycle [s]. Before CPython 3.13 the clock of Windows has 15.6 ms steps."""
 _REGISTER = Read(0x0000, 2)
 
 
 @dataclass(frozen=True, slots=True)
 class Punctuality:
-    """One check: a histogram of the time from the due moment to the frame's return.
+    """One check: a histogram of the time from the due time to the frame's return.
 
-    ``counts`` by the classes of `EDGES_US`, µs. Frames that did not come back are in the last one.
+    ``counts`` by the bins of `EDGES_US` [µs]. Frames that did not come back are in the last one.
     """
 
     counts: tuple[int, ...]
 
     @property
     def cycles(self) -> int:
-        """How many were measured."""
+        """Number of cycles measured."""
         return sum(self.counts)
 
     def missed(self, cycle_us: float) -> int:
-        """Cycles that were not over in time; a class that reaches beyond counts wholly."""
+        """Return the cycles that ended too late; a bin that extends beyond the cycle counts."""
         ends = (*EDGES_US, math.inf)
         return sum(n for n, end in zip(self.counts, ends, strict=True) if end > cycle_us)
 
     def bound(self, cycle_us: float) -> float:
-        """The share of missed cycles that is not exceeded with 95 % confidence."""
+        """Return the upper bound of the share of missed cycles, with 95 % confidence."""
         return missed_bound(self.missed(cycle_us), self.cycles)
 
     def allows(self, cycle_us: float) -> bool:
-        """Whether process data may be exchanged in this cycle."""
+        """Return whether process data may be exchanged with this cycle [µs]."""
         return self.bound(cycle_us) <= ALLOWED_MISSED
 
 
 class Check:
-    """The measurement in the host. One call of `cycle` is one cycle; commands go in between."""
+    """The measurement in the host. One call of `cycle` is one cycle; commands run in between."""
 
     def __init__(self, segment: Wire, station: int, seconds: float) -> None:
         self._segment = segment
@@ -76,12 +77,12 @@ class Check:
         self._due_ns = time.monotonic_ns() + PERIOD_US * 1000
 
     def cycle(self) -> Message | None:
-        """Wait for the next moment and send one frame; the result once all are measured."""
+        """Wait for the next due time and send one frame; return the result after the last cycle."""
         time.sleep(max(self._due_ns - time.monotonic_ns(), 0) * 1e-9)
         answered = self._segment.exchange([(self._station, _REGISTER)])[0] is not None
         used_us = (time.monotonic_ns() - self._due_ns) / 1000
         self._used.add(used_us if answered else 10 * EDGES_US[-1])
-        # A cycle that is over is not made up for: the next one is on the grid again.
+        # A missed cycle is not made up for: the next one is on the grid again.
         late = max(time.monotonic_ns() - self._due_ns, 0) // (PERIOD_US * 1000)
         self._due_ns += (late + 1) * PERIOD_US * 1000
         self._left -= 1
@@ -89,17 +90,17 @@ class Check:
 
 
 class Kept:
-    """The last check of each adapter, in a file among what can be made again."""
+    """The last check of each adapter, in a file in the cache folder."""
 
     def __init__(self, interface: str, file: Path | None = None) -> None:
-        """``file`` is given by tests."""
+        """Select the adapter; only tests set ``file``."""
         self.interface = interface
         self._file = file or _folder() / "ethercat-punctuality.json"
-        # Another Python or computer has another clock and other sleeps.
+        # Another Python or computer has a different clock and different sleeps.
         self._key = f"{interface} {socket.gethostname()} {sys.version.split()[0]}"
 
     def read(self) -> Punctuality | None:
-        """The last check; None where there is none."""
+        """Return the last check; None if there is none."""
         counts = self._all().get(self._key)
         if not isinstance(counts, list) or len(counts) != len(EDGES_US) + 1:
             return None
@@ -108,7 +109,7 @@ class Kept:
         return Punctuality(tuple(counts))
 
     def write(self, found: Punctuality) -> None:
-        """Keep it. Where that is not possible the next exchange measures again."""
+        """Store the check. If that is not possible, the next exchange measures again."""
         kept = self._all() | {self._key: asdict(found)["counts"]}
         try:
             self._file.parent.mkdir(parents=True, exist_ok=True)
@@ -125,7 +126,7 @@ class Kept:
 
 
 def require_fine_clock(measured_s: Callable[[], float] = resolution_s) -> None:
-    """The clock of this Python can show whether a cycle was kept.
+    """Require a clock of this Python fine enough to show whether a cycle was kept.
 
     Raises:
         NotAllowed: its steps are longer than `COARSEST_CLOCK_S`.
@@ -139,7 +140,7 @@ def require_fine_clock(measured_s: Callable[[], float] = resolution_s) -> None:
 
 
 def require_punctual(interface: str, found: Punctuality, cycle_s: float) -> None:
-    """Process data may be exchanged in this cycle.
+    """Require that process data may be exchanged with this cycle.
 
     Raises:
         NotAllowed: too many cycles would be missed.

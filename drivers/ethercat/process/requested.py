@@ -1,4 +1,4 @@
-"""Requests to the AL state machine as they are, for trying what a slave makes of them.
+"""Unfiltered requests to the AL state machine, to test how a slave responds to them.
 
 Source: ETG.1000.6 clause 6.4 (state machine), ETG.1000.4 clause 6 (registers).
 """
@@ -17,12 +17,12 @@ from drivers.ethercat.wire.steps import Pause, Steps, Write
 from drivers.link import Progress
 
 _UNKNOWN_S = 1.0
-"""For so long a request of no known state may go without an answer."""
+"""Time-out of a request for an unknown state [s]."""
 _WAIT_STEP_S = 0.002
 _ANSWER_S = 30.0
 
 Call = Callable[[dict[str, Any], float, Progress | None], Awaitable[Any]]
-"""A message to the host with its time-out [s] and progress."""
+"""Sends a message to the host, with its time-out [s] and progress."""
 
 
 class AlRequests:
@@ -32,13 +32,13 @@ class AlRequests:
         self._call = call
 
     async def request(self, station: int, control: int) -> AlAnswer:
-        """Write ``control`` to 120h and wait for the slave's decision."""
+        """Write ``control`` to 120h and wait for the slave's response."""
         message = {"op": "al_request", "station": station, "control": control}
         return AlAnswer(*await self._call(message, _ANSWER_S, None))
 
 
 def refuse_op(station: Station, control: int) -> None:
-    """Op is only requested where a slave has to refuse it: without process data it is no state.
+    """Allow a request for Op only from Pre-Op, where a slave without process data must refuse it.
 
     Raises:
         NotAllowed: Op is requested of a slave that is not in Pre-Op.
@@ -48,7 +48,7 @@ def refuse_op(station: Station, control: int) -> None:
 
 
 def request(station: Station, control: int, clock: Callable[[], float]) -> Steps[list[int]]:
-    """Write 120h; 130h and 134h once the state or the error bit show a decision, or time is up."""
+    """Write 120h; return 130h and 134h after the state or error bit responds, or the time-out."""
     wanted = control & 0x0F
     known = wanted in set(AlState)
     deadline = clock() + (STATE_TIMEOUT_S[AlState(wanted)] if known else _UNKNOWN_S)

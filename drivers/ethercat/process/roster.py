@@ -1,4 +1,4 @@
-"""The stations of a segment: finding them, watching them, taking them up again."""
+"""The stations of a segment: search, supervision, and recovery."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ _LET_END_S = 0.3
 _MIN_MAILBOX = 16
 _FIND_TRIES = 5
 _PAUSES_S = (1.0, 3.0, 10.0)
-"""Between tries to mend what a search left out, or left wrong: each costs the others a moment."""
+"""Pauses between attempts to repair what a search left out or set wrong [s]: each delays others."""
 _MENDINGS = 2
-"""After so many tries on its own a station is searched for again: what is known may be wrong."""
+"""After this many attempts on its own, the segment is searched again: the data may be wrong."""
 _ENABLES = 0x0F
 
 Send = Callable[[Message], None]
 
 
 class Roster:
-    """Knows which stations there are and how they are; reports every change."""
+    """Keeps the list of stations and their states; reports every change."""
 
     def __init__(self, segment: Segment, lanes: Lanes, ring: Ring, send: Send) -> None:
         self.segment = segment
@@ -54,7 +54,7 @@ class Roster:
         self._search_due = False
         self._wanted, self._wanted_at = 0, 0.0
         self._repairing: dict[int, tuple[int, float]] = {}
-        #: Stations whose last control word by mailbox enables: no search may reset them.
+        #: Stations enabled by their last control word over the mailbox: no search may reset them.
         self._powered: set[int] = set()
         self._managers: dict[int, bytes] = {}
         self._emergencies: dict[int, tuple[bytes, float]] = {}
@@ -66,17 +66,17 @@ class Roster:
 
     @property
     def powered(self) -> bool:
-        """Whether a control word by mailbox has enabled a station."""
+        """Whether a control word over the mailbox has enabled a station."""
         return bool(self._powered)
 
     # Watching ------------------------------------------------------------------------------
 
     def housekeeping(self, now: float) -> None:
-        """Look after lost and returned stations, and after the interface itself."""
+        """Supervise lost and returned stations, and the interface itself."""
         self.exchange.housekeeping()
         loop = self.exchange.loop
         if loop is not None and loop.suspicious():
-            # Whoever is gone is left out before the others lose trust and brake as well.
+            # A lost station is left out before the others become invalid and brake as well.
             self._next_watch = now
         if now < self._next_watch:
             return
@@ -156,13 +156,15 @@ class Roster:
             self._repairing.pop(station.number, None)
 
     def _repair(self, station: Station) -> None:
-        """It fell out of PREOP, as when a frame of the search was lost: nobody could stop it so.
+        """Bring a station in INIT back to PREOP.
 
-        Or it never came there, as when it was switched on again and took longer to start than a
-        state may take: it answered no parameter, and nobody asked for another state.
+        It fell out of PREOP, for example because a frame of the search was lost, and cannot be
+        stopped in INIT. Or it never reached PREOP, for example because it was switched on again and
+        started more slowly than a state change may take; it then answers no parameter, and nothing
+        else requests another state.
         """
         number, now = station.number, time.monotonic()
-        # No search takes anything from it that it still had.
+        # A search cannot reset anything in it that is still set.
         self._powered.discard(number)
         tries, due = self._repairing.get(number, (0, now))
         if now < due or self.exchange.loop is not None or self.lanes.busy(number, "mailbox"):
@@ -193,7 +195,7 @@ class Roster:
         if self.segment.recover(station.number):
             self._returned(station, restarted=True)
         elif station.number in self.new_aliases and self.exchange.loop is None:
-            # SOEM knows a slave by its old alias and refuses it with the new one.
+            # SOEM identifies a slave by its old alias and refuses it with the new one.
             self._search_due = True
 
     def _returned(self, station: Station, *, restarted: bool) -> None:
@@ -208,7 +210,7 @@ class Roster:
             self.lanes.submit(station.number, "mailbox", steps, _ignore)
 
     def al_text(self, station: Station) -> Text:
-        """AL state and status of a station."""
+        """Return AL state and status of a station as a message."""
         number, state = station.number, state_name(station.al_state)
         if station.al_state & ERROR_BIT:
             cause = al_status_text(station.al_code)
@@ -218,14 +220,14 @@ class Roster:
     def event(
         self, kind: EventKind, station: int | None, why: Text, code: int | None = None
     ) -> None:
-        """Inform the server; the figures go first, so that who looks at them sees the same."""
+        """Send an event to the server, after the figures, so that both are consistent."""
         self._send({"event": "status"} | self.status())
         event = {"kind": kind, "station": station, "text": why.to_wire(), "code": code}
         self._send({"event": "link"} | event)
 
     def _emergency(self, number: int) -> Callable[[bytes], None]:
         def received(data: bytes) -> None:
-            # SOEM-era firmware repeats an emergency until it is read: once a second is enough.
+            # Some firmware repeats an emergency until it is read: once a second is enough.
             last, at = self._emergencies.get(number, (b"", 0.0))
             now = time.monotonic()
             if data == last and now - at < 1.0:
@@ -245,14 +247,14 @@ class Roster:
         return received
 
     def commanded(self, number: int, control_word: int) -> None:
-        """A control word went to a station by mailbox."""
+        """Record a control word sent to a station by mailbox."""
         if control_word & _ENABLES == _ENABLES:
             self._powered.add(number)
         else:
             self._powered.discard(number)
 
     def _request_search(self) -> None:
-        """Search again soon, with growing pauses for as long as that does not help."""
+        """Request a search, with growing pauses while searching does not help."""
         now = time.monotonic()
         if now >= self._wanted_at:
             self._wanted_at = now + _PAUSES_S[min(self._wanted, len(_PAUSES_S) - 1)]
@@ -261,7 +263,7 @@ class Roster:
     # Finding -------------------------------------------------------------------------------
 
     def knows(self, numbers: Sequence[int]) -> bool:
-        """These stations are there and need no search, which would reset all the others."""
+        """Return whether these stations are known, so that no search has to reset the others."""
         return (
             self.attached
             and self.exchange.loop is None
@@ -273,7 +275,7 @@ class Roster:
         )
 
     def require_not_held(self) -> None:
-        """No EEPROM of the segment is being written.
+        """Require that no EEPROM of the segment is being written.
 
         Raises:
             Busy: one is.
@@ -282,7 +284,7 @@ class Roster:
             raise Busy("ethercat.eeprom-being-written", station=min(self.held))
 
     def attach(self) -> None:
-        """Search the segment and make the stations; blocks for as long as SOEM takes."""
+        """Search the segment and create the stations; blocks for as long as SOEM takes."""
         if self.exchange.loop is not None:
             raise Busy("ethercat.cyclic-exchange-runs-segment")
         self.require_not_held()
@@ -296,14 +298,14 @@ class Roster:
         self.attached = True
 
     def _let_end(self) -> None:
-        """What healthy drives were asked before is answered; a mute one is not waited for."""
+        """Let pending requests of responding drives finish, without waiting for silent drives."""
         deadline = time.monotonic() + _LET_END_S
         while (due := self.lanes.wake_s()) is not None and time.monotonic() < deadline:
             if not self.lanes.step():
                 time.sleep(max(min(due, deadline) - time.monotonic(), 0.0))
 
     def attach_and_identify(self) -> None:
-        """Search the segment and begin to identify what is there."""
+        """Search the segment and start identifying its stations."""
         self.attach()
         for found in self.stations:
             steps = transactions.identify(found, time.monotonic)
@@ -316,7 +318,7 @@ class Roster:
         for _ in range(_FIND_TRIES):
             managers = managers or self.segment.read(number, 0x800, 16)
         if managers is None:
-            # Not a device without mailbox: one that does not answer. It is accepted when it does.
+            # Not a device without mailbox, but one that does not answer. It is added when it does.
             self._search_due = True
             station.notes.append(text("ethercat.note-not-answered"))
         else:
@@ -329,11 +331,15 @@ class Roster:
         return station
 
     def managers(self, number: int) -> bytes:
-        """Registers of the sync managers 0 and 1 of a station in PREOP."""
+        """Return the registers of sync managers 0 and 1 of a station in PREOP."""
         return self._managers[number]
 
     def station(self, message: Message) -> Station:
-        """The station a message is about; searches the segment if that was not done yet."""
+        """Return the station addressed by a message; search the segment first if not yet done.
+
+        Raises:
+            LinkLost: there is no such station, or it does not answer.
+        """
         number = int(message["station"])
         if not self.attached:
             self.attach_and_identify()
@@ -355,7 +361,7 @@ class Roster:
         return station
 
     def status(self) -> Message:
-        """The state of everything, sent several times a second."""
+        """Return the state of everything, sent several times a second."""
         return {
             "attached": self.attached,
             "open": self.is_open,
@@ -375,4 +381,4 @@ class Roster:
 
 
 def _ignore(_result: object, _error: DriveError | None) -> None:
-    """For transactions that report by events."""
+    """Ignore the result of a transaction that reports by events."""

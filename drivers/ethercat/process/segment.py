@@ -1,17 +1,17 @@
-"""The pysoem Master behind guards.
+"""The pysoem Master with safeguards.
 
-Every guard answers a crash or a leak that was reproduced with pysoem 1.1.13: interface names
+Each safeguard prevents a crash or a leak that was reproduced with pysoem 1.1.13: interface names
 longer than 15 characters overflow a buffer; ``close()`` on a master that never opened closes
-descriptor 0 and a second one closes a stranger's; a failed open leaks its socket; outputs longer
-than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
+descriptor 0, and a second one closes a foreign descriptor; a failed open leaks its socket; outputs
+longer than the slave's overwrite memory; the IO map of 4096 bytes is not checked; errors of earlier
 calls stay in a global queue and are raised by later ones.
 
-And SOEM distinguishes answers by an index of four bits alone: when 16 late frames lie in the
-socket, each request is at once answered by one that is 16 frames old, for ever. So late frames
-are thrown away before anything is sent, and registers are read and written by frames of our own.
+SOEM also distinguishes answers by an index of four bits alone: when 16 late frames are in the
+socket, each request is at once answered by one that is 16 frames old, permanently. So late frames
+are discarded before anything is sent, and registers are read and written by frames of our own.
 
 SOEM assumes that slaves of the same vendor, product and revision have the same EEPROM, and reads
-only the first one's. Drives that show nothing of themselves all have 0, whatever they are.
+only that of the first. Drives that state no identity all have 0, whatever they are.
 """
 
 from __future__ import annotations
@@ -47,26 +47,29 @@ MAX_STATIONS = 199
 _NAME_LIMIT = 15
 _EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US, _IDLE_FRAME_TIMEOUT_US = 2000, 10_000
-"""With and without process data. A mail is gone once it was read: a slave made of software, on a
-busy computer, may send the frame with it late."""
+"""Without and with process data: time-out of a frame [µs].
+
+A mail is lost once it was read: a slave in software, on a busy computer, may send the frame with it
+late.
+"""
 _MARGIN_US = 1000
 _RECOVER_US = 2000
 _STALL_S = 0.1
 _MOST_STRAY = 64
-"""Frames of something else that may come before the answer."""
+"""Number of foreign frames that may arrive before the answer."""
 _OTHER_FRAME, _TOO_MANY = -2, -4
-"""What SOEM's search returns besides a number of slaves."""
+"""Results of SOEM's search other than a number of slaves."""
 
 _FIND_TRIES = 3
-"""A segment that stands still for a moment answers nothing, or too late and to another question."""
+"""A briefly stalled segment answers not at all, or too late and to a different request."""
 
 
 class InvalidMap(ProtocolError):
-    """SOEM took something else for an answer while it asked for the mapping.
+    """SOEM took a different mail for an answer while it requested the mapping.
 
-    Only a new search helps: SOEM gives every further mapping FMMUs of its own next to those of the
-    one that failed, which then go on writing outputs and reading inputs at the wrong places, and
-    the third mapping is beyond the end of its list.
+    Only a new search helps: for every further mapping, SOEM adds FMMUs to those of the failed one,
+    which then keep writing outputs and reading inputs at the wrong places, and the third mapping
+    exceeds the end of its list.
     """
 
 
@@ -74,7 +77,7 @@ class Segment:
     """One interface with its slaves. Stations count from 1, in the order of the cable."""
 
     def __init__(self, interface: str, *, raw_frames: bool = True) -> None:
-        """Without ``raw_frames`` all goes through SOEM's own calls, as on Windows and macOS."""
+        """Without ``raw_frames`` everything uses SOEM's own calls, as on Windows and macOS."""
         self.interface = interface
         self._library = None if raw_frames else LibraryWire()
         self._master: pysoem.Master | None = None
@@ -84,24 +87,24 @@ class Segment:
         self.slaves: Sequence[pysoem.CdefSlave] = ()
         self.mapped = False
         self._fresh = False
-        """Nothing was mapped since the search."""
+        """No mapping has been made since the search."""
         self._waits = True
-        """Frames are waited for; not while process data are exchanged."""
+        """Calls wait for frames; not while process data are exchanged."""
         self.frame_timeout_us = _FRAME_TIMEOUT_US
         self.late_frames = 0
-        """Frames that came back after they had been given up."""
+        """Frames that came back after their time-out."""
         self._ear: socket.socket | None = None
         self._scrap = bytearray(2048)
         self._number = 0
         self.silent = False
-        """The last frame of ours did not come back."""
+        """The last frame sent here did not come back."""
 
     def open(self) -> None:
-        """Open the interface for us alone.
+        """Open the interface exclusively.
 
         Raises:
-            LinkLost: no such interface, switched off, or not permitted; the message says which.
-            Busy: another programme of ours has it.
+            LinkLost: no such interface, switched off, or not permitted; the message states which.
+            Busy: another servodeck process uses it.
         """
         if self._master is not None:
             return
@@ -132,12 +135,13 @@ class Segment:
         self._index = socket.if_nametoindex(self.interface)
         self._ear = socket.socket(fileno=os.dup(self.socket_fd))
         if not was_promiscuous:
-            # SOEM switches it for good; bound to the socket it ends with it, even on SIGKILL.
+            # SOEM sets it permanently; bound to the socket it ends with the socket, even on
+            # SIGKILL.
             promiscuous.bind_to(self._ear, self.interface, self._index)
         self._master = master
 
     def _open_by_library(self) -> None:
-        # A frame is sent again after this time, and ours are given up before: each is sent once.
+        # SOEM repeats a frame after this time; ours time out earlier, so that each is sent once.
         pysoem.settings.timeouts.ret = self._patience_us() + _MARGIN_US
         master = pysoem.Master()
         try:
@@ -155,7 +159,7 @@ class Segment:
         self._master = master
 
     def close(self) -> None:
-        """Close the interface once; calling again does nothing."""
+        """Close the interface once; further calls have no effect."""
         master, self._master = self._master, None
         self.slaves, self.socket_fd, self.mapped = (), None, False
         if self._ear is not None:
@@ -166,8 +170,9 @@ class Segment:
         self._unlock()
 
     def replaced(self) -> bool:
-        """Whether the interface has to be opened again: it vanished or came back as another, or
-        old answers match new requests.
+        """Return whether the interface has to be opened again.
+
+        It vanished or came back as another one, or old answers match new requests.
         """
         if self._library is not None:
             return self.mixed_up
@@ -178,7 +183,7 @@ class Segment:
 
     @property
     def mixed_up(self) -> bool:
-        """Old answers match new requests; see `drivers.ethercat.process.library_wire`."""
+        """Whether old answers match new requests; see `drivers.ethercat.process.library_wire`."""
         return self._library is not None and self._library.mixed_up
 
     @property
@@ -193,12 +198,13 @@ class Segment:
         return self._master
 
     def find(self) -> int:
-        """Reset the segment, give every slave its address and ask it for PREOP.
+        """Reset the segment, give every slave its address and request PREOP.
 
-        Returns the number of slaves; 0 when nobody answers.
+        Returns the number of slaves; 0 if none answers.
 
         Raises:
             ProtocolError: more slaves than can be handled.
+            LinkLost: answers come too late.
         """
         self.mapped, self._fresh = False, False
         self.master.manual_state_change = 0
@@ -222,7 +228,7 @@ class Segment:
         return len(self.slaves)
 
     def discard_late_frames(self) -> None:
-        """Throw away what nobody waits for any more; to be called with no frame under way."""
+        """Discard frames that nothing waits for; to be called with no frame in transit."""
         if self._ear is None:
             return
         try:
@@ -231,12 +237,14 @@ class Segment:
         except BlockingIOError:
             return
         except OSError:
-            # The interface went down: whoever sends next is informed.
+            # The interface went down: the next send reports it.
             return
 
     def in_step(self) -> bool:
-        """Whether the next answer will be that of the next request; to be called with no frame
-        under way. Late frames are discarded, or probes sent where they cannot be seen.
+        """Return whether the next answer will match the next request.
+
+        To be called with no frame in transit. Late frames are discarded, or, where they cannot be
+        seen, probes are sent.
         """
         if self._library is not None:
             return self._library.in_step(self._patience_us())
@@ -244,20 +252,20 @@ class Segment:
         return True
 
     def wait_for_frames(self, waits: bool) -> None:
-        """Whether sending and receiving may wait; not while process data are exchanged."""
+        """Set whether sending and receiving may wait; not while process data are exchanged."""
         self._waits = waits
         if self.socket_fd is not None:
             set_blocking(self.socket_fd, waits)
 
     def note_process_data(self, *, came_back: bool) -> None:
-        """Whether a frame of process data came back."""
+        """Count whether a frame of process data came back."""
         if self._library is not None:
             self._library.count(came_back=came_back)
 
     def exchange(self, requests: Sequence[frames.Request]) -> list[bytes | None]:
-        """Accesses to registers in one frame; see `frames.answers`, all None for a lost frame.
+        """Access registers in one frame; see `frames.answers`; all None for a lost frame.
 
-        They must fit one frame. A frame that came back late is nobody's answer any more.
+        The requests must fit one frame. A frame that comes back late is discarded.
         """
         if self._library is not None:
             replies = self._library.exchange(requests, self._patience_us())
@@ -281,8 +289,8 @@ class Segment:
         scrap = memoryview(self._scrap)
         try:
             ear.send(sent, MSG_DONTWAIT)
-            # What has come is accepted however late it is: this process may have stood still
-            # itself.
+            # Frames already received are accepted however late they are: this process may have been
+            # stalled itself.
             for _ in range(_MOST_STRAY):
                 left_s = max(deadline - time.monotonic(), 0.0)
                 if not select.select((ear,), (), (), left_s)[0]:
@@ -293,7 +301,7 @@ class Segment:
                     return reported
                 self.late_frames += 1
         except OSError:
-            # Nothing to read after all, a full queue, or the interface went down.
+            # Nothing to read, a full queue, or the interface went down.
             return None
         return None
 
@@ -304,23 +312,23 @@ class Segment:
         return _FRAME_TIMEOUT_US if self.silent else self.frame_timeout_us
 
     def read(self, station: int, register: int, size: int) -> bytes | None:
-        """Read a register of a slave, or None when it does not answer."""
+        """Read a register of a slave; return None without an answer."""
         return self.exchange([(station, Read(register, size))])[0]
 
     def write(self, station: int, register: int, data: bytes) -> bool:
-        """Write a register of a slave; False when it does not answer."""
+        """Write a register of a slave; return False without an answer."""
         return self.exchange([(station, Write(register, data))])[0] is not None
 
     def map(self, expected_bytes: int) -> None:
-        """Build the IO map from what the drives have mapped. States stay as they are.
+        """Build the IO map from the mappings in the drives. States remain unchanged.
 
-        ``expected_bytes`` is the sum of all process data, checked before SOEM writes past the
-        end of its buffer. SOEM reads the mapping entry by entry: slaves pack a whole object in
-        several ways, and SOEM takes one for granted.
+        ``expected_bytes`` is the sum of all process data, checked before SOEM writes past the end
+        of its buffer. SOEM reads the mapping entry by entry: slaves pack a whole object in several
+        ways, and SOEM assumes one of them.
 
         Raises:
-            NotAllowed: more process data than the IO map holds, or no search came before.
-            InvalidMap: a drive's mapping could not be read; to be searched for and mapped again.
+            NotAllowed: more process data than the IO map holds, or no search preceded.
+            InvalidMap: a drive's mapping could not be read; search and map again.
         """
         if expected_bytes > IO_MAP_BYTES:
             raise NotAllowed(
@@ -349,7 +357,7 @@ class Segment:
         self.mapped = True
 
     def set_output(self, station: int, data: bytes) -> None:
-        """Set the outputs of a slave, with the length that it has."""
+        """Set the outputs of a slave, which must have the length of its process data."""
         self._check_mapped()
         slave = self.slaves[station - 1]
         size = len(slave.output)
@@ -360,16 +368,16 @@ class Segment:
         slave.output = data
 
     def sizes(self, station: int) -> tuple[int, int]:
-        """Bytes of outputs and inputs of a slave, once mapped."""
+        """Return the bytes of outputs and inputs of a slave, once mapped."""
         self._check_mapped()
         slave = self.slaves[station - 1]
         return len(slave.output), len(slave.input)
 
     def recover(self, station: int) -> bool:
-        """Give a slave that was switched off its address back; False when it is another one."""
+        """Set the address of a restarted slave again; return False if it is a different one."""
         if not self.in_step() and self.mixed_up:
             return False
-        # SOEM sends some of these frames without waiting, and needs the socket to block then.
+        # SOEM sends some of these frames without waiting, which requires a blocking socket.
         if self.socket_fd is not None:
             set_blocking(self.socket_fd, True)
         began = time.perf_counter()
@@ -384,7 +392,7 @@ class Segment:
         return back
 
     def forget_errors(self) -> None:
-        """Empty SOEM's queue of errors, so that nobody else is blamed for them."""
+        """Empty SOEM's error queue, so that later calls do not raise these errors."""
         self.master._collect_mailbox_errors()  # noqa: SLF001 - pysoem's only way to empty it
 
     def _check_mapped(self) -> None:
@@ -409,7 +417,7 @@ class Segment:
             raise LinkLost(report.text, remedy="; ".join(report.commands) or others)
 
     def _check_adapter(self) -> None:
-        """Only what is in the list of the packet capture library is opened."""
+        """Check the adapter: only those listed by the packet capture library are opened."""
         require_ethercat_adapter(self.interface)
         report = permissions.check(self.interface)
         if not report.ready:
@@ -424,7 +432,7 @@ class Segment:
 
 
 def _device(interface: str) -> str:
-    """What SOEM opens: the device of the adapter in its own list, else the interface's name."""
+    """Return what SOEM opens: the adapter's device in its own list, else the interface name."""
     if RAW_FRAMES:
         return interface
     listed = (one.device for one in packet_capture.adapters() if one.name == interface)
@@ -432,7 +440,7 @@ def _device(interface: str) -> str:
 
 
 def _lock(interface: str) -> socket.socket | BinaryIO:
-    """A name that one process alone holds; see `hold_name`."""
+    """Hold a system-wide name for this process alone; see `hold_name`."""
     try:
         return hold_name(f"servodeck-ethercat-{interface}")
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What is known of one slave, and the transactions with it."""
+"""State of one slave, and the transactions with it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
 _SERVO = 402
 
-#: ETG.1020 clause 5.3.7.2: how long a slave may take for each state.
+#: Time-outs of state changes [s] (ETG.1020 clause 5.3.7.2).
 STATE_TIMEOUT_S = {
     AlState.INIT: 5.0,
     AlState.PREOP: 3.0,
@@ -48,28 +48,29 @@ class Station:
     al_code: int = 0
     lost: bool = False
     badly_found: bool = False
-    """Frames of the search were lost: its clock could not be asked for, or its EEPROM names a
-    mailbox that was not set up."""
+    """Frames of the search were lost: the presence of its clock could not be read, or its EEPROM
+    states a mailbox that was not set up.
+    """
     complete_access: bool = True
     single_only: set[int] = field(default_factory=set)
-    """Objects whose complete access was not certain."""
+    """Objects whose layout in complete access was not certain."""
     to_prove: dict[int, bytes] = field(default_factory=dict)
     proven: dict[int, tuple[tuple[int, int], ...]] = field(default_factory=dict)
-    """Layouts of whole objects that were found equal to single reads, with their lengths."""
+    """Layouts of whole objects, with lengths, that were verified by single reads."""
     describes: bool = True
-    """It has the SDO information service, as far as is known."""
+    """The drive has the SDO information service, as far as is known."""
     device_profile: int | None = None
-    """Low word of 1000h; None where it was not read."""
+    """Low word of 1000h; None if it was not read."""
     notes: list[Text] = field(default_factory=list)
     ports: esc.PortCounters | None = None
     wiring: esc.PortCounters | None = None
-    """Its ports when last every station answered: what is behind a cable that is cut now."""
+    """Its ports when all stations last answered: shows what is behind a cable that is now cut."""
     clock_ahead_ns: int | None = None
-    """Of the reference clock; None without distributed clock."""
+    """Deviation from the reference clock; None without distributed clock."""
 
     @property
     def identity(self) -> list[int | None]:
-        """What distinguishes this drive from any other."""
+        """Vendor, product and serial number, which identify this drive."""
         return [self.vendor_id, self.product_code, self.serial]
 
     @property
@@ -89,10 +90,10 @@ class Station:
         return self.mailbox
 
     def require_parameters(self) -> None:
-        """Its state is one in which a drive answers for parameters.
+        """Check that the state is one in which a drive answers parameter requests.
 
         Raises:
-            LinkLost: it stays in INIT with an error, in its own words.
+            LinkLost: it stays in INIT with an error; the message states its AL status.
         """
         if self.al_state != AlState.INIT | ERROR_BIT:
             return
@@ -108,12 +109,12 @@ class Station:
 
 
 def al_status(station: Station) -> Steps[bool]:
-    """Read the AL state and code into ``station``; False when it does not answer."""
+    """Read the AL state and code into ``station``; return False without an answer."""
     return (yield from _al_status(station)) is True
 
 
 def _al_status(station: Station) -> Steps[bool | None]:
-    """As `al_status`; None where the frame was lost, which says nothing about the station."""
+    """Read as `al_status`; None for a lost frame, which does not indicate a lost station."""
     data = yield Read(AL_STATUS, 6, may_be_empty=True)
     if not data:
         return None if data is None else False
@@ -123,10 +124,10 @@ def _al_status(station: Station) -> Steps[bool | None]:
 
 
 def answers(station: Station, clock: Callable[[], float]) -> Steps[bool]:
-    """Whether it is there; its AL state and code are read.
+    """Return whether the station answers, after reading its AL state and code.
 
-    A frame that comes back untouched is certain after `registers.TRIES`; lost ones, as while the
-    segment or the computer stands still for a moment, are asked again for `registers.GONE_S`.
+    A frame that comes back unprocessed is conclusive after `registers.TRIES`; lost frames, as while
+    the segment or the computer is stalled, are repeated for `registers.GONE_S`.
     """
     deadline = clock() + GONE_S
     untouched = 0
@@ -144,11 +145,11 @@ def answers(station: Station, clock: Callable[[], float]) -> Steps[bool]:
 def change_state(
     station: Station, target: AlState, clock: Callable[[], float], timeout_s: float | None = None
 ) -> Steps[None]:
-    """Drive the slave to ``target``, acknowledging an error first.
+    """Bring the slave to ``target``, acknowledging an error first.
 
     Raises:
         NotAllowed: the slave refused; the reason is its AL status code as text.
-        LinkTimeout: it did not get there in the time of ETG.1020.
+        LinkTimeout: it did not get there within ``timeout_s``, by default the time of ETG.1020.
         LinkLost: it does not answer.
     """
     limit_s = STATE_TIMEOUT_S[target] if timeout_s is None else timeout_s
@@ -202,16 +203,17 @@ def _refused(station: Station, target: AlState) -> NotAllowed:
 
 
 def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
-    """Wait for PREOP, then fill identity, alias, ports and mailbox-reported names.
+    """Go to PREOP, then read identity, alias, ports and the names from the mailbox.
 
-    What a slave does not have stays empty; a slave that refuses PREOP keeps a note as text.
+    Data that a slave does not have stay empty; for a slave that refuses PREOP the reason is noted
+    as text.
     """
     station.notes.clear()
     alias = yield from read_again(0x12, 2, clock)
     station.alias = int.from_bytes(alias or b"\0\0", "little")
     features = yield from read_again(0x08, 2, clock)
     station.distributed_clock = bool(features and features[0] & 0x04)
-    # Unheard it is not one without a distributed clock: nothing of it is known.
+    # Without an answer, the presence of a distributed clock is unknown, not excluded.
     station.badly_found = features is None
     if (yield from read_ports(station)):
         station.wiring = station.ports
@@ -248,7 +250,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
 
 
 def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
-    """To PREOP; where a lost frame left the mailboxes without their sync managers, once more."""
+    """Go to PREOP; retry with new sync managers if a lost frame left the mailboxes without."""
     try:
         yield from change_state(station, AlState.PREOP, clock)
     except NotAllowed:
@@ -264,7 +266,7 @@ def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:
 
 
 def _compare_identity(station: Station) -> Steps[None]:
-    """1018h and the SII should agree; where they do not, the user is informed."""
+    """Note differences between 1018h and the SII for the user."""
     for sub, code, ours in (
         (1, "ethercat.note-other-vendor", station.vendor_id),
         (2, "ethercat.note-other-product", station.product_code),
@@ -284,7 +286,7 @@ def _try_read(station: Station, index: int, subindex: int) -> Steps[bytes | None
 
 
 def clear_ports(station: Station) -> Steps[None]:
-    """Set the error counters to zero; any write to them does (ETG.1000.4 clause 6.2).
+    """Clear the error counters; any write to them does (ETG.1000.4 clause 6.2).
 
     Raises:
         LinkLost: the station does not answer.
@@ -303,7 +305,7 @@ def clear_ports(station: Station) -> Steps[None]:
 def read_ports(station: Station) -> Steps[bool]:
     """Read link state and error counters of the four ports, and the deviation of the clock.
 
-    Returns whether the station answered; its last figures stay where it did not.
+    Returns whether the station answered; without an answer its last figures are kept.
     """
     status = yield from read_again(esc.DL_STATUS, 2)
     if status is None:

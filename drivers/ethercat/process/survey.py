@@ -1,4 +1,4 @@
-"""A segment at one moment, as the host process shows it: places, ports, clocks, punctuality."""
+"""Snapshot of a segment as the host process reports it: positions, ports, clocks, timing."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from drivers.texts.message import Text
 
 @dataclass(frozen=True, slots=True)
 class SurveyedStation:
-    """One slave. ``parent`` is the station before it (0: the computer) and ``parent_port`` the
-    socket there, as found when last every station answered. ``clock_ahead_ns`` is the deviation
-    of its clock from the reference clock, None without distributed clock.
+    """One slave.
+
+    ``parent`` is the station before it (0: the computer) and ``parent_port`` the port there, as
+    found when all stations last answered. ``clock_ahead_ns`` is the deviation of its clock from the
+    reference clock, None without distributed clock.
     """
 
     station: int
@@ -37,18 +39,18 @@ class SurveyedStation:
 
     @property
     def state(self) -> str:
-        """AL state by name; empty while the station does not answer."""
+        """Name of the AL state; empty while the station does not answer."""
         return "" if self.lost else state_name(self.al)
 
     @property
     def al_text(self) -> Text | None:
-        """Why it is in this state and what to do, where it says so."""
+        """Reason of its error and what to do; None without an error."""
         return al_status_text(self.al_code) if self.al & ERROR_BIT and not self.lost else None
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """All stations in the order of the cable, and what their counters accuse."""
+    """All stations in the order of the cable, and the faults that their counters indicate."""
 
     stations: tuple[SurveyedStation, ...]
     findings: tuple[Finding, ...]
@@ -56,7 +58,7 @@ class Survey:
 
 @dataclass(frozen=True, slots=True)
 class ExchangeFigures:
-    """Of the running exchange, since its start.
+    """Figures of the running exchange, since its start.
 
     ``late`` counts wake-ups: the first figure those less than 1 µs late, figure n those from
     2^(n-1) up to 2^n µs, the last one everything above. DC figures are the deviation [ns] of the
@@ -79,7 +81,7 @@ class ExchangeFigures:
 
 
 def survey_from(answer: Message) -> Survey:
-    """From the host's answer to "counters"."""
+    """Convert the host's answer to "counters"."""
     ports = {item["station"]: _ports(item) for item in answer["ports"]}
     stations = tuple(_station(item, ports.get(item["station"])) for item in answer["stations"])
     findings = (
@@ -90,7 +92,7 @@ def survey_from(answer: Message) -> Survey:
 
 
 def exchange_from(status: Message) -> ExchangeFigures | None:
-    """From the cyclic part of the host's status; None while nothing is exchanged."""
+    """Convert the cyclic part of the host's status; None while nothing is exchanged."""
     if not status.get("running"):
         return None
     names = ExchangeFigures.__dataclass_fields__.keys() - {"late"}

@@ -1,1 +1,1 @@
-"""EtherCAT bytes: registers, mailbox, CoE, FoE, SII, without I/O of their own."""
+"""EtherCAT protocols: registers, mailbox, CoE, FoE, SII, without I/O of their own."""

@@ -18,10 +18,10 @@ class AlState(IntEnum):
 
 
 ERROR_BIT = 0x10
-"""In 0x130 the slave has fallen back; in 0x120 the master acknowledges that."""
+"""In 0x130 the slave has fallen back to a lower state; in 0x120 the master acknowledges that."""
 
 
-#: Codes that ETG.1020 lists, each with its words in the catalogue.
+#: Codes listed in ETG.1020, each with a text in the catalogue.
 _KNOWN = frozenset(
     {
         0x0000,
@@ -92,14 +92,14 @@ _KNOWN = frozenset(
 
 
 def al_status_text(code: int) -> Text:
-    """The message of an AL status code; 0x8000 and above are the maker's own."""
+    """Return the message of an AL status code; 0x8000 and above are manufacturer-specific."""
     if code in _KNOWN:
         return text(f"al-status.x{code:04x}")
     return text("al-status.of-the-maker" if code >= 0x8000 else "al-status.unknown", number=code)
 
 
 def state_name(status: int) -> str:
-    """``SAFEOP`` or ``SAFEOP + error`` for the low byte of register 0x130."""
+    """Return ``SAFEOP`` or ``SAFEOP + error`` for the low byte of register 0x130."""
     try:
         name = AlState(status & 0x0F).name
     except ValueError:

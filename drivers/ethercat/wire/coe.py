@@ -1,7 +1,7 @@
 """CANopen over EtherCAT: SDO transfers and complete access.
 
 Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.2. Aborts are accepted with any low
-command bits and under either service number: several makers' stacks differ there.
+command bits and under either service number: the stacks of several manufacturers differ there.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def upload(
 ) -> Steps[bytes]:
     """Read an object; with ``complete`` all of it, subindex 0 first.
 
-    What a stop overtakes is read again from its beginning.
+    A read interrupted by a stop is repeated from its beginning.
 
     Raises:
         Rejected: the drive aborted.
@@ -138,7 +138,7 @@ def download(
     complete: bool = False,
     timeout_s: float | None = None,
 ) -> Steps[None]:
-    """Write an object: expedited up to 4 bytes, in one mail or in segments above.
+    """Write an object: expedited up to 4 bytes, otherwise in one mail or in segments.
 
     Raises:
         Rejected: the drive aborted.
@@ -186,10 +186,10 @@ def download(
 
 
 def stop_write(box: Mailbox, index: int, subindex: int, data: bytes) -> Steps[None]:
-    """Write up to four bytes although another transaction may wait for its answer.
+    """Write up to four bytes even while another transaction waits for its answer.
 
-    Nothing is drained or asked first. A mailbox that is still busy, and an abort that may belong
-    to what was overtaken, have it sent once more.
+    Nothing is drained or read first. It is sent again if the mailbox is still busy, and once after
+    an abort, which may belong to the interrupted transaction.
 
     Raises:
         Rejected: the drive aborted it.
@@ -223,21 +223,21 @@ def stop_write(box: Mailbox, index: int, subindex: int, data: bytes) -> Steps[No
 
 
 def stopped_first() -> NotAllowed:
-    """The error of a write that a stop has overtaken before it was sent."""
+    """Create the error of a write that was cancelled by a stop before it was sent."""
     return NotAllowed("ethercat.stop-came-first-not")
 
 
 def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
     """Make sure that no late answer can be mistaken for the next one.
 
-    A slave answers in order. After a time-out a harmless read of another object is asked first:
-    when its answer is here, everything older has come and been dropped.
+    A slave answers in order. After a time-out another object is read first: when that answer
+    arrives, every older answer has arrived and been dropped.
     """
     if not (box.unsettled or force):
         return
     yield from box.drain()
     if force:
-        # SOEM used this mailbox: the slave drops our mail if its counter happens to be SOEM's last.
+        # SOEM used this mailbox: the slave drops our mail if its counter equals SOEM's last one.
         with contextlib.suppress(LinkTimeout):
             request = struct.pack("<HBHB4x", _REQUEST, 0x40, 0x1000, 0)
             yield from box.request(COE, request, _answer_to(0x1000, 0), _DROPPED_S)
@@ -248,13 +248,12 @@ def settle(box: Mailbox, *, force: bool = False) -> Steps[None]:
 
 
 def split_complete(data: bytes, sizes: dict[int, int], *, proven: bool) -> dict[int, bytes]:
-    """Entries of a complete-access answer by subindex, or nothing where its layout is not certain.
+    """Split a complete-access answer by subindex; empty where its layout is not certain.
 
     ``sizes`` are the lengths of the known entries. Subindex 0 is padded to 16 bits (ETG.1000.6
-    clause 5.6.2.1); some slaves send it as one byte, some leave reserved subindices out. An
-    answer is certain when every byte is accounted for *and* subindex 0 agrees: all of 1…n, or
-    the highest known one. Where it disagrees, ``proven`` says that this layout has been compared
-    with single reads.
+    clause 5.6.2.1); some slaves send it as one byte, some omit reserved subindices. An answer is
+    certain if every byte is accounted for *and* subindex 0 agrees: all of 1…n, or the highest known
+    one. Where it disagrees, ``proven`` states that this layout has been verified by single reads.
     """
     if not data:
         return {}
@@ -315,7 +314,7 @@ def _unexpected(answer: int) -> Text:
 
 
 def _give_up(box: Mailbox, index: int, subindex: int, code: int, why: Text) -> Steps[NoReturn]:
-    """Abort towards the slave, then raise."""
+    """Abort the transfer towards the slave, then raise ProtocolError."""
     yield from box.post(COE, struct.pack("<HBHBI", _REQUEST, 0x80, index, subindex, code))
     box.unsettled = True
     at = f"{index:04X}:{subindex:02X}"

@@ -1,4 +1,4 @@
-"""ESC registers as values: ports, error counters, topology, and which cable is bad.
+"""ESC registers as values: ports, error counters, topology, and faulty cables.
 
 Source: ETG.1000.4 clauses 6.1 (0x0110 DL status) and 6.2 (0x0300 error counters).
 """
@@ -15,9 +15,9 @@ ERROR_COUNTERS = 0x0300
 ERROR_COUNTERS_SIZE = 20
 TIME_DIFFERENCE = 0x092C
 _MOST = 255
-"""Where a counter stops."""
+"""Maximum of a counter, at which it stops."""
 
-#: A frame goes through the open ports of a slave in this order.
+#: Order in which a frame passes the open ports of a slave.
 _PORT_ORDER = (0, 3, 1, 2)
 
 
@@ -35,7 +35,7 @@ class Port:
 
 @dataclass(frozen=True, slots=True)
 class PortCounters:
-    """All ports of a slave and its two counters that belong to no port."""
+    """All ports of a slave and its two counters that do not belong to a port."""
 
     station: int
     ports: tuple[Port, ...]
@@ -45,7 +45,7 @@ class PortCounters:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a counter accuses; ``port`` is None for what belongs to no cable."""
+    """A fault indicated by a counter; ``port`` is None if it does not concern a cable."""
 
     station: int
     port: int | None
@@ -53,10 +53,10 @@ class Finding:
 
 
 def decode_time_difference(register: bytes) -> int:
-    """How far [ns] the slave's clock is ahead of the reference clock; negative: behind.
+    """Return how far the slave's clock is ahead of the reference clock [ns]; negative: behind.
 
-    Register 0x92C: magnitude in bits 0…30, bit 31 set when the local copy is smaller
-    (ETG.1000.4 clause 6.5, table 65).
+    Register 0x92C: magnitude in bits 0…30, bit 31 set when the local copy is smaller (ETG.1000.4
+    clause 6.5, table 65).
     """
     raw = int.from_bytes(register[:4], "little")
     magnitude = raw & 0x7FFFFFFF
@@ -64,7 +64,7 @@ def decode_time_difference(register: bytes) -> int:
 
 
 def decode_ports(station: int, dl_status: bytes, counters: bytes | None) -> PortCounters:
-    """Ports from register 0x110 (2 bytes) and 0x300 (20 bytes, or None where unread)."""
+    """Decode the ports from register 0x110 (2 bytes) and 0x300 (20 bytes, or None if not read)."""
     status = int.from_bytes(dl_status, "little")
     raw = counters if counters is not None and len(counters) >= 20 else bytes(20)
     ports = tuple(
@@ -82,10 +82,10 @@ def decode_ports(station: int, dl_status: bytes, counters: bytes | None) -> Port
 
 
 def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
-    """For each station the station before it and the port there; 0 is the computer.
+    """Return for each station the station before it and the port there; 0 is the computer.
 
-    Follows the frame: each slave hands it to its open ports in the order 0, 3, 1, 2, and a
-    branch is finished before the next port opens.
+    Follows the frame: each slave forwards it to its open ports in the order 0, 3, 1, 2, and a
+    branch is completed before the next port.
     """
     found: dict[int, tuple[int, int]] = {}
     open_ports: list[tuple[int, int]] = []
@@ -99,14 +99,14 @@ def parents(stations: Sequence[PortCounters]) -> dict[int, tuple[int, int]]:
 def findings(
     stations: Sequence[PortCounters], upstream: Mapping[int, tuple[int, int]]
 ) -> list[Finding]:
-    """Which cable or connector the counters accuse; empty when nothing is wrong.
+    """Return the faulty cables or connectors that the counters indicate; empty if none.
 
-    ``upstream`` is what `parents` reported while every station answered: while a cable is cut its
-    ports no longer say what is behind them.
+    ``upstream`` is the result of `parents` while every station answered: while a cable is cut, the
+    ports no longer show what is behind them.
 
-    Only ``rx_errors`` and ``invalid_frames`` that are not forwarded ones arise at the port
-    itself. Port 0 of a station hears the one before it, so errors there and at the port of the
-    station before are the same cable, each direction for itself.
+    Only ``rx_errors`` and ``invalid_frames`` that were not forwarded arise at the port itself. Port
+    0 of a station receives from the one before it, so errors there and at the port of the station
+    before belong to the same cable, one direction each.
     """
     before = {(parent, port): station for station, (parent, port) in upstream.items()}
     found = []

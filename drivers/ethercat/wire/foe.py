@@ -12,11 +12,11 @@ from drivers.ethercat.wire.steps import Pause, Steps
 from drivers.texts.message import joined, prose, text
 
 ERASE_S, PACKET_S = 30.0, 10.0
-"""Drives that erase their memory first, or check the whole file at the end, take their time."""
+"""Time-outs [s]: some drives first erase their memory, or check the whole file at the end."""
 
 _WRITE, _DATA, _ACK, _ERROR, _BUSY = 2, 3, 4, 5, 6
 
-#: Error codes of ETG.1000.6 with words in the catalogue.
+#: Error codes of ETG.1000.6 with a text in the catalogue.
 _ERRORS = frozenset(
     {
         0x8000,
@@ -49,13 +49,13 @@ def write_file(
     password: int,
     on_progress: Callable[[int], None],
 ) -> Steps[None]:
-    """Send ``data`` as file ``name``; ``on_progress`` gets the number of bytes accepted so far.
+    """Send ``data`` as file ``name``; ``on_progress`` receives the number of bytes accepted.
+
+    The drive may take `ERASE_S` for the first and the last answer, `PACKET_S` for the others.
 
     Raises:
         Rejected: the drive refused, with its error code and text.
         LinkTimeout, LinkLost: the transfer broke off; the file in the drive is unusable.
-
-    The drive may take `ERASE_S` for the first and the last answer, `PACKET_S` for the others.
     """
     request = struct.pack("<BxI", _WRITE, password) + name.encode("ascii", "replace")
     room = box.payload_size - 6
@@ -78,7 +78,7 @@ def write_file(
 def _until_acknowledged(box: Mailbox, mail: bytes, packet: int, timeout_s: float) -> Steps[None]:
     waited = 0.0
     while True:
-        # Broken off it leaves a drive without firmware: a computer that stands still is no reason.
+        # Breaking off leaves a drive without firmware; a stalled computer does not justify that.
         answer = yield from box.request(FOE, mail, _is_foe, timeout_s, gone_s=GONE_S)
         code = answer[0]
         if code == _ACK:

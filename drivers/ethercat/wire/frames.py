@@ -1,9 +1,8 @@
-"""EtherCAT frames of our own: register accesses of several stations in one frame.
+"""EtherCAT frames built here: register accesses of several stations in one frame.
 
 SOEM distinguishes answers by an index of four bits alone, so that a late frame may be mistaken for
-the answer to a later request. Ours carry an index that SOEM never gives (0 to 15 are its own), and
-an answer counts only where everything that slaves leave alone is as it was sent.
-
+the answer to a later request. These frames carry an index that SOEM never uses (0 to 15 are its
+own), and an answer is accepted only if everything that slaves do not change is as it was sent.
 Source: ETG.1000.4 clauses 5.3 (frame) and 5.4 (datagrams).
 """
 
@@ -16,10 +15,10 @@ from drivers.ethercat.wire.steps import Read, Write
 
 ETHERTYPE = b"\x88\xa4"
 FIRST_INDEX, INDICES = 0x80, 0x80
-"""Indices of our frames; SOEM uses 0 to 15 and drops what has another one."""
+"""Indices of our frames; SOEM uses 0 to 15 and drops frames with another one."""
 
 ROOM_BYTES = 1498
-"""For datagrams in one Ethernet frame, behind the two bytes of the EtherCAT header."""
+"""Room for datagrams in one Ethernet frame, after the two bytes of the EtherCAT header."""
 
 _STATION_BASE = 0x1000
 """SOEM gives the first slave the address 1001h, and so on (its EC_NODEOFFSET)."""
@@ -31,16 +30,16 @@ _BROADCAST, _SOURCE = b"\xff" * 6, b"\x01" * 6
 _SHORTEST = 60
 
 Request = tuple[int, Read | Write]
-"""A station, counted from 1, and what is asked of it."""
+"""A station, counted from 1, and the access to it."""
 
 
 def bytes_of(access: Read | Write) -> int:
-    """What an access takes of a frame's room."""
+    """Return the bytes that an access occupies in a frame."""
     return _OVERHEAD + (access.size if isinstance(access, Read) else len(access.data))
 
 
 def build(requests: Sequence[Request], index: int) -> bytes:
-    """One frame; the requests must fit `ROOM_BYTES` together."""
+    """Build one frame; the requests together must fit `ROOM_BYTES`."""
     parts = []
     last = len(requests) - 1
     for number, (station, access) in enumerate(requests):
@@ -66,10 +65,10 @@ def build(requests: Sequence[Request], index: int) -> bytes:
 def answers(
     requests: Sequence[Request], sent: bytes, frame: bytes | bytearray | memoryview
 ) -> list[bytes | None] | None:
-    """What came back for each request; None when this frame is the answer to something else.
+    """Return the answer to each request; None if this frame does not belong to them.
 
-    Data of a read that somebody answered, ``b""`` for a write that was taken. Nobody did: None,
-    or ``b""`` for a read that ``may_be_empty``.
+    An answer is the data of a read that a station answered, or ``b""`` for a write that was
+    accepted. Without an answer: None, or ``b""`` for a read that ``may_be_empty``.
     """
     at = _ETHERNET
     if len(frame) < len(sent) or frame[at - 2 : at + _HEADER] != sent[at - 2 : at + _HEADER]:
@@ -77,7 +76,7 @@ def answers(
     at += _HEADER
     found: list[bytes | None] = []
     for _, access in requests:
-        # Command, index, address and length: slaves change nothing of them but one bit.
+        # Command, index, address and length: slaves leave these unchanged except for one bit.
         if frame[at : at + 7] != sent[at : at + 7] or (frame[at + 7] ^ sent[at + 7]) & ~0x40:
             return None
         size = bytes_of(access) - _OVERHEAD

@@ -1,4 +1,4 @@
-"""The SDO information service: what a drive's own dictionary reports of itself.
+"""The SDO information service: the drive's own object dictionary.
 
 Generators over `Mailbox`; no I/O. Source: ETG.1000.6 clause 5.6.3.
 """
@@ -19,14 +19,14 @@ _INFO = 8
 
 
 def list_objects(box: Mailbox) -> Steps[list[int]]:
-    """All object indices of the drive's own dictionary (list type 1)."""
+    """Read all object indices of the drive's own dictionary (list type 1)."""
     parts = yield from _info(box, 0x01, struct.pack("<H", 1), 0x02)
     raw = b"".join(part[2:] if number == 0 else part for number, part in enumerate(parts))
     return sorted(set(struct.unpack(f"<{len(raw) // 2}H", raw[: len(raw) // 2 * 2])))
 
 
 def describe_object(box: Mailbox, index: int) -> Steps[ObjectInfo]:
-    """Name, type and number of entries of one object."""
+    """Read name, type and number of entries of one object."""
     parts = yield from _info(box, 0x03, struct.pack("<H", index), 0x04)
     data = b"".join(parts)
     if len(data) < 6:
@@ -36,7 +36,7 @@ def describe_object(box: Mailbox, index: int) -> Steps[ObjectInfo]:
 
 
 def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescription]:
-    """Type, length, access and name of one entry, with unit, default and limits if reported."""
+    """Read type, length, access and name of one entry; unit, default and limits if reported."""
     wanted = 0x08 | 0x10 | 0x20 | 0x40
     parts = yield from _info(box, 0x05, struct.pack("<HBB", index, subindex, wanted), 0x06)
     data = b"".join(parts)
@@ -56,7 +56,7 @@ def describe_entry(box: Mailbox, index: int, subindex: int) -> Steps[EntryDescri
 
 
 def _info(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Steps[list[bytes]]:
-    """One information request; the answer comes in as many mails as it needs."""
+    """Send one information request; the answer comes in as many mails as it needs."""
     for _ in range(OVERTAKEN_READS):
         try:
             return (yield from _info_once(box, opcode, data, answer_code))
@@ -75,7 +75,7 @@ def _info_once(box: Mailbox, opcode: int, data: bytes, answer_code: int) -> Step
         return service == _INFO and mail.payload[2] & 0x7F in (answer_code, 0x07)
 
     request = struct.pack("<HBBH", _INFO << 12, opcode, 0, 0) + data
-    # Hundreds of requests in a row: a computer that stands still meanwhile is no reason to give up.
+    # Hundreds of requests in a row: a stalled computer must not end them.
     answer = yield from box.request(COE, request, matches, gone_s=GONE_S)
     parts: list[bytes] = []
     while True:

@@ -1,12 +1,12 @@
 """Runs transactions step by step: one frame at a time, with the next step of every station.
 
-Every station has a lane for its mailbox and one for its registers. A lane runs one transaction
-at a time, different lanes interleave, so that a slow drive does not hold up a fast one, and
-process data go out between any two frames. What several lanes have to ask goes in one frame.
+Every station has a lane for its mailbox and one for its registers. A lane runs one transaction at a
+time; different lanes interleave, so that a slow drive does not delay a fast one, and process data
+are sent between any two frames. The accesses of several lanes share one frame.
 
-Within a lane a write goes before reads that wait, and between two objects of a batch. A stop goes
-before everything: what is under way is suspended in the middle, after at most `GRACE_S`, and
-writes that wait are ended unsent, so that none of them follows the stop.
+Within a lane a write precedes waiting reads, also between two objects of a batch. A stop precedes
+everything: a transaction in progress is suspended in the middle, after at most `GRACE_S`, and
+waiting writes are ended unsent, so that none of them follows the stop.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from drivers.ethercat.wire.steps import Gap, Pause, Read, Step, Steps, Write
 from drivers.texts.message import Text
 
 GRACE_S = 0.01
-"""How long a stop lets the answer under way come: most drives need 1 to 5 ms."""
+"""Time that a stop leaves for the pending answer [s]: most drives need 1 to 5 ms."""
 
 LaneName = Literal["mailbox", "register"]
 Done = Callable[[Any, DriveError | None], None]
@@ -33,14 +33,14 @@ Done = Callable[[Any, DriveError | None], None]
 
 
 class Wire(Protocol):
-    """One frame for several accesses."""
+    """Exchanges one frame with several accesses."""
 
     def exchange(self, requests: Sequence[Request]) -> list[bytes | None]:
         """As `drivers.ethercat.wire.frames.answers`; all None for a lost frame."""
 
 
 class Urgency(IntEnum):
-    """What goes before what in a lane."""
+    """Priority within a lane."""
 
     NORMAL = 0
     WRITE = 1
@@ -56,21 +56,21 @@ class _Job:
     reply: bytes | None = None
     wake_s: float = 0.0
     calm: bool = True
-    """Nothing of it is under way."""
+    """No access of the job is pending."""
 
 
 @dataclass
 class _Lane:
     station: int
     waiting: list[_Job] = field(default_factory=list)
-    """The most urgent first, each kind in its order."""
+    """The most urgent first, in order of arrival within each priority."""
     running: list[_Job] = field(default_factory=list)
     """The last one runs; those before it are suspended."""
     widest: int = 0
-    """Most bytes that one access took of a frame."""
+    """Most bytes of a frame that one access has taken."""
 
     def choose(self, now: float) -> _Job | None:
-        """What runs now: what waits may go before what runs."""
+        """Return the job to run now: a waiting one may precede the running one."""
         first = self.waiting[0] if self.waiting else None
         top = self.running[-1] if self.running else None
         if first is not None and (top is None or self._gives_way(top, first, now)):
@@ -84,7 +84,7 @@ class _Lane:
         return top.calm or (first.urgency is Urgency.STOP and now >= first.asked_s + GRACE_S)
 
     def due_s(self) -> float | None:
-        """When its next step is due; None when there is nothing to do."""
+        """Return when its next step is due; None if there is nothing to do."""
         first = self.waiting[0] if self.waiting else None
         if not self.running:
             return None if first is None else 0.0
@@ -116,7 +116,7 @@ class Lanes:
         done: Done,
         urgency: Urgency = Urgency.NORMAL,
     ) -> None:
-        """Queue a transaction; a stop ends the writes that wait."""
+        """Queue a transaction; a stop ends the waiting writes."""
         found = self._lanes.get((station, lane))
         if found is None:
             found = self._lanes[station, lane] = _Lane(station)
@@ -133,23 +133,23 @@ class Lanes:
             job.done(None, stopped_first())
 
     def busy(self, station: int, lane: LaneName) -> bool:
-        """Whether a transaction runs or waits there."""
+        """Return whether a transaction runs or waits in this lane."""
         found = self._lanes.get((station, lane))
         return found is not None and bool(found.running or found.waiting)
 
     def pending(self) -> bool:
-        """Whether anything runs or waits."""
+        """Return whether any transaction runs or waits."""
         return any(lane.running or lane.waiting for lane in self._order)
 
     def wake_s(self) -> float | None:
-        """When the next step is due; None when there is nothing to do."""
+        """Return when the next step is due; None if there is nothing to do."""
         due = [at for lane in self._order if (at := lane.due_s()) is not None]
         return min(due, default=None)
 
     def step(self, room: int = ROOM_BYTES) -> bool:
-        """Do the next access of every lane that is due, in one frame. False when none is.
+        """Do the next access of every lane that is due, in one frame. False if none is due.
 
-        A lane that may not fit into ``room`` bytes any more is the first of the next frame.
+        A lane whose access may no longer fit into ``room`` bytes comes first in the next frame.
         """
         now = self._clock()
         frame: list[tuple[_Job, Request]] = []
@@ -164,7 +164,7 @@ class Lanes:
             size = bytes_of(taken[1][1])
             lane.widest = max(lane.widest, size)
             if frame and size > room:
-                # Never kept for later: a stop might come in between.
+                # Never postponed: a stop might come in between.
                 self._send(frame)
                 frame, room = [], ROOM_BYTES
             frame.append(taken)
@@ -180,7 +180,7 @@ class Lanes:
             job.reply = reply
 
     def drop(self, why: Text) -> None:
-        """End everything that runs or waits with an error."""
+        """End all running and waiting transactions with an error."""
         for lane in tuple(self._order):
             jobs = [*lane.running, *lane.waiting]
             for job in lane.running:
@@ -191,7 +191,7 @@ class Lanes:
                 job.done(None, LinkLost(why, remedy="ethercat.tried-again-by-itself"))
 
     def _next_access(self, lane: _Lane, now: float) -> tuple[_Job, Request] | None:
-        """Run a lane up to its next access; None where it has none now."""
+        """Run a lane up to its next access; None if it has none now."""
         while (job := lane.choose(now)) is not None and job.wake_s <= now:
             step = self._advance(lane, job)
             if isinstance(step, Read | Write):
@@ -201,7 +201,7 @@ class Lanes:
         return None
 
     def _advance(self, lane: _Lane, job: _Job) -> Step | None:
-        """The next step of a transaction; None when it has ended."""
+        """Return the next step of a transaction; None when it has ended."""
         try:
             step = job.steps.send(job.reply)
         except StopIteration as stop:
@@ -213,7 +213,7 @@ class Lanes:
             job.done(None, error)
             return None
         except (struct.error, ValueError, IndexError) as error:
-            # Whatever a slave sends, the process that moves axes goes on.
+            # Whatever a slave sends must not end the process that moves axes.
             lane.running.remove(job)
             reported = ProtocolError("ethercat.drive-sent-something-cannot", cause=str(error))
             job.done(None, reported)

@@ -1,4 +1,4 @@
-"""Reading a list of objects through a mailbox, in parts that let others in between."""
+"""Reading a list of objects through a mailbox, in parts that let other requests in between."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from drivers.ethercat.process.protocol import Message, error_from_wire
 from drivers.link import Address
 
 Item: TypeAlias = tuple[int, int, int | None]
-"""Index, subindex and size in bytes where it is known."""
+"""Index, subindex, and size in bytes if known."""
 
 Ask: TypeAlias = Callable[[list[Item], float], Awaitable[list[bytes | Message]]]
-"""Ask for items, waiting that many seconds more than for one answer; errors are as on the pipe."""
+"""Request items, with a time-out longer by this many seconds; errors in their wire form."""
 
 _CHUNK, _CHUNKS_AHEAD = 32, 2
-#: After so many parts in a row without any answer the rest of a list is not asked for.
+#: After this many consecutive parts without an answer, the rest of a list is not requested.
 _SILENT_CHUNKS = 2
 
 
 async def read_list(
     station: int, addresses: Sequence[Address], ask: Ask
 ) -> list[bytes | DriveError]:
-    """Read ``addresses`` in order; an error stands for what was not read.
+    """Read ``addresses`` in order; an error stands for each value that was not read.
 
     Raises:
         DriveError: the process that owns the segment did not answer, or does not know the station.
@@ -34,7 +34,7 @@ async def read_list(
     items = [(*object_of(address), size_of(address.type)) for address in addresses]
     reported: dict[Item, bytes | Message | NotAsked] = {}
     silent: list[list[Item]] = []
-    # One part is under way while the next one waits, so that the drive is never idle; a third
+    # One part is in progress while the next one waits, so that the drive is never idle; a third
     # reader comes in between, and a write or a stop before them.
     ahead = asyncio.Semaphore(_CHUNKS_AHEAD)
 
@@ -66,10 +66,10 @@ async def read_list(
 
 
 def object_of(address: Address) -> tuple[int, int]:
-    """Index and subindex.
+    """Return index and subindex.
 
     Raises:
-        NotAllowed: it exists only on other links.
+        NotAllowed: the value exists only on other links.
     """
     if address.index is None:
         raise NotAllowed(
@@ -79,10 +79,10 @@ def object_of(address: Address) -> tuple[int, int]:
 
 
 def fitted(address: Address, data: bytes) -> bytes:
-    """Exactly the bytes of the type; a longer answer is cut only where the rest is padding.
+    """Return exactly the bytes of the type; a longer answer is cut only if the rest is padding.
 
     Raises:
-        ProtocolError: it is no value of the type.
+        ProtocolError: the data are not a value of the type.
     """
     size = size_of(address.type)
     if size is None or len(data) == size:
@@ -100,7 +100,7 @@ def fitted(address: Address, data: bytes) -> bytes:
 
 
 def _chunks(items: Sequence[Item]) -> list[list[Item]]:
-    """Parts of some dozens, an object never cut, so that other requests come in between."""
+    """Split into parts of some dozens, objects kept whole, to let other requests in between."""
     chunks: list[list[Item]] = [[]]
     for _, members in itertools.groupby(sorted(set(items), key=lambda i: i[:2]), lambda i: i[0]):
         if len(chunks[-1]) >= _CHUNK:
@@ -121,6 +121,6 @@ def _value(answer: bytes | Message | NotAsked) -> bytes:
     if isinstance(answer, bytes):
         return answer
     if isinstance(answer, NotAsked):
-        # One of its own for every place, as the caller names the parameter in it.
+        # A separate instance for every place, as the caller adds the parameter to it.
         raise NotAsked(answer.text, remedy=answer.remedy_text)
     raise error_from_wire(answer)  # type: ignore[arg-type]

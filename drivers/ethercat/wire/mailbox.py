@@ -1,8 +1,7 @@
 """The mailbox of one slave: framing and transactions as generators without any I/O.
 
-See `drivers.ethercat.wire.steps` for what a transaction yields and is sent back.
-
-Source: ETG.1000.4 clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clause 5.6 (CoE).
+See `drivers.ethercat.wire.steps` for what a transaction yields and receives. Source: ETG.1000.4
+clause 5.6 (mailbox header, counter, repeat), ETG.1000.6 clause 5.6 (CoE).
 """
 
 from __future__ import annotations
@@ -42,7 +41,7 @@ _ERRORS = {
 
 _RESEND_S = 0.02
 _DEAD_READS, _DEAD_S, _DEAD_PAUSE_S = 5, 0.05, 0.002
-"""A station is gone after so many reads and so long: the segment may only stand still."""
+"""A station is gone after this many reads and this time: the segment may only be stalled."""
 _WORTH_WAITING_S = 0.0003
 _LONGEST_WAIT_S, _FIRST_USUAL_S = 0.01, 0.0002
 _LOOKS, _LOOK_AGAIN_S = 4, 40e-6
@@ -52,15 +51,15 @@ _EARLIER, _LATER = 0.997, 0.25
 class Overtaken(LinkTimeout):
     """A stop was sent while this transaction waited for its answer.
 
-    What was read can be read again; a write is never repeated, its outcome is unknown.
+    A read can be repeated; a write is never repeated, and its outcome is unknown.
     """
 
 
 class _Seen(NamedTuple):
-    """What came of looking into the mailbox without asking for its status.
+    """Result of reading the mailbox without reading its status.
 
-    ``repeat_at`` is set where a frame was lost: not at once, the slave may not have answered yet,
-    and would repeat an old mail.
+    ``repeat_at`` is set if a frame was lost: a repeat must not be requested at once, as the slave
+    may not have answered yet and would repeat an old mail.
     """
 
     mail: Mail | None
@@ -77,7 +76,7 @@ class Mail(NamedTuple):
 
 
 def frame(protocol: int, counter: int, payload: bytes, size: int) -> bytes:
-    """A mailbox padded to its full ``size``: the last byte is what shows the slave of it.
+    """Return a mail padded to the full ``size``: writing the last byte signals it to the slave.
 
     Raises:
         ProtocolError: the payload does not fit.
@@ -91,7 +90,7 @@ def frame(protocol: int, counter: int, payload: bytes, size: int) -> bytes:
 
 
 def parse(data: bytes) -> Mail:
-    """Header and payload of a mailbox that was read.
+    """Split a mailbox that was read into header and payload.
 
     Raises:
         ProtocolError: the announced length does not fit the mailbox.
@@ -106,10 +105,10 @@ def parse(data: bytes) -> Mail:
 
 @dataclass
 class Mailbox:
-    """One slave's pair of mailboxes and what is remembered of it.
+    """One slave's pair of mailboxes and their state.
 
-    Counters run from 2 to 7: SOEM, which asks for the mapping by itself in ``config_map``,
-    begins with 1 after ``config_init``, and a slave drops a mail that repeats the last counter.
+    Counters run from 2 to 7: SOEM, which requests the mapping by itself in ``config_map``, begins
+    with 1 after ``config_init``, and a slave drops a mail that repeats the last counter.
     """
 
     out_address: int
@@ -121,22 +120,22 @@ class Mailbox:
     timeout_s: float = 1.0
     counter: int = field(default=1, init=False)
     unsettled: bool = field(default=False, init=False)
-    """A request timed out: its answer may still come and must not answer the next one."""
+    """A request timed out: its answer may still come and must not be taken for the next one."""
     repeats: int = field(default=0, init=False)
     usual_s: float = field(default=0.0, init=False)
-    """How long answers take as a rule: asking earlier only disturbs."""
+    """Usual response time [s]: reading the mailbox earlier only disturbs."""
     _last_counter: int = field(default=0, init=False)
     _asked_again: bool = field(default=False, init=False)
     epoch: int = field(default=0, init=False)
-    """Raised by `overtake`: what began before ends with its answer, or is `Overtaken`."""
+    """Incremented by `overtake`: an earlier request ends with its answer, or is `Overtaken`."""
     stopping: bool = field(default=False, init=False)
-    """A stop waits its short while: nothing may be sent again before it."""
+    """A stop waits for its short delay: nothing may be repeated before it."""
     _aside: deque[Mail] = field(default_factory=lambda: deque(maxlen=8), init=False)
-    """Answers to what was overtaken, that came while the stop waited for its own."""
+    """Answers to interrupted requests that arrived while the stop waited for its own."""
 
     @property
     def payload_size(self) -> int:
-        """Longest payload that may be sent."""
+        """Longest payload that can be sent."""
         return self.out_size - 6
 
     def request(
@@ -151,12 +150,12 @@ class Mailbox:
     ) -> Steps[bytes]:
         """Send a mail and wait for the one that ``matches``; others are dropped.
 
-        With ``keep`` others are kept for the transaction that this one has overtaken. For
-        ``gone_s`` frames may be lost before the station is treated as gone.
+        With ``keep``, others are kept for the transaction that this one has interrupted. The
+        station is treated as gone only if frames are lost for ``gone_s``.
 
         Raises:
             LinkLost: the station answers no frame at all.
-            LinkTimeout: the mailbox stays mute.
+            LinkTimeout: the mailbox does not answer.
             Overtaken: a stop came in between, and the answer did not come before it.
             ProtocolError: the slave answers with a mailbox error.
         """
@@ -172,9 +171,9 @@ class Mailbox:
         )
 
     def overtake(self) -> None:
-        """From here on nothing that is under way is sent again (ETG.1000.4 clause 5.6).
+        """Prevent that anything sent so far is repeated (ETG.1000.4 clause 5.6).
 
-        Without this an enabling control word whose frame was lost would follow the stop.
+        Otherwise an enabling control word whose frame was lost would follow the stop.
         """
         self.epoch += 1
         self.stopping = False
@@ -182,7 +181,7 @@ class Mailbox:
         self._aside.clear()
 
     def post(self, protocol: int, payload: bytes) -> Steps[None]:
-        """Send a mail that nobody answers."""
+        """Send a mail that is not answered."""
         self._next_counter()
         mail = frame(protocol, self.counter, payload, self.out_size)
         yield from self._send(mail, self.epoch, _DEAD_S)
@@ -193,7 +192,7 @@ class Mailbox:
         return (yield from self._wait(b"", True, matches, deadline, epoch=self.epoch))
 
     def drain(self) -> Steps[None]:
-        """Read what lies in the mailbox: emergencies are reported, everything else dropped."""
+        """Empty the mailbox: emergencies are reported, everything else is dropped."""
         for _ in range(32):
             status = yield Read(SM1_STATUS, 1)
             if status is None or not status[0] & _FULL:
@@ -206,10 +205,10 @@ class Mailbox:
         self.counter = self.counter + 1 if self.counter < 7 else 2
 
     def _send(self, mail: bytes, epoch: int, gone_s: float) -> Steps[bool]:
-        """True when the slave certainly has the mail.
+        """Send a mail; return True if the slave certainly has it.
 
-        False where a lost frame or a mailbox that is still full leaves it open: `_wait` sends it
-        again. What lies in the other mailbox is left alone, it may already be the answer.
+        False if a lost frame or a full mailbox leaves that open: `_wait` then sends it again. The
+        other mailbox is not read, as it may already hold the answer.
         """
         tries, deadline = 0, self.clock() + gone_s
         while tries < _DEAD_READS or self.clock() < deadline:
@@ -272,7 +271,7 @@ class Mailbox:
                 continue
             now = self.clock()
             if repeat_at is not None and now > repeat_at:
-                # The first look may have emptied the mailbox, and its frame was lost.
+                # The first read may have emptied the mailbox, and its frame was lost.
                 repeat_at = None
                 yield from self._ask_again()
                 continue
@@ -280,7 +279,7 @@ class Mailbox:
                 self.unsettled = True
                 raise LinkTimeout("ethercat.drive-not-answer-time")
             if not delivered and now > resend_at and not self.stopping:
-                # The same counter: a slave that did get the mail drops the copy.
+                # The same counter: a slave that did receive the mail drops the copy.
                 delivered = (yield Write(self.out_address, mail)) is not None
                 resend_at = now + _RESEND_S
             if pause_s:
@@ -288,10 +287,10 @@ class Mailbox:
             pause_s = min(pause_s + 0.00002, 0.0005)
 
     def _look(self, mail: bytes, delivered: bool) -> Steps[_Seen]:
-        """Read the mailbox without asking for its status, when the answer is usually there.
+        """Read the mailbox without reading its status, at the time the answer is usually there.
 
-        Two frames for a transaction instead of three and more: an empty mailbox does no harm
-        (working counter 0), and looking again is one frame.
+        Two frames for a transaction instead of three or more: reading an empty mailbox has no
+        effect (working counter 0), and reading again is one frame.
         """
         at = self.clock()
         if not mail or not delivered or not self.usual_s:
@@ -313,7 +312,7 @@ class Mailbox:
         return _Seen(None, at)
 
     def _received(self, data: bytes) -> Mail | None:
-        """A mail; None for one that the slave has sent before (ETG.1000.4 clause 5.6)."""
+        """Parse a mail; None for one that the slave has sent before (ETG.1000.4 clause 5.6)."""
         mail, counter = parse(data), data[5] >> 4 & 0x07
         repeated = self._asked_again and counter != 0 and counter == self._last_counter
         self._asked_again = False
@@ -321,7 +320,7 @@ class Mailbox:
         return None if repeated else mail
 
     def _kept(self, matches: Callable[[Mail], bool], last: Mail | None = None) -> bytes:
-        """The answer that came before the stop's own: a slave answers in order."""
+        """Return the answer that came before the stop's own: a slave answers in order."""
         for mail in (*self._aside, *(() if last is None else (last,))):
             if mail.protocol != MAILBOX_ERROR and matches(mail):
                 payload: bytes = mail.payload
@@ -329,10 +328,11 @@ class Mailbox:
         raise _overtaken()
 
     def _learn(self, took_s: float, *, at_once: bool) -> None:
-        """How long to leave the slave alone next time: until the first look just finds the answer.
+        """Adapt the delay before the first read so that it just finds the answer.
 
-        A little shorter each time while it does, and longer by a part of what was missed. One slow
-        answer (a drive that writes its memory) is no rule.
+        The delay is slightly reduced while the first read succeeds, and increased by a part of the
+        excess otherwise. A single slow answer (a drive that writes its memory) has a limited
+        effect.
         """
         if at_once:
             self.usual_s *= _EARLIER
@@ -343,7 +343,7 @@ class Mailbox:
             self.usual_s += min(longer_s, self.usual_s / 2 + _FIRST_USUAL_S)
 
     def _fetch(self) -> Steps[Mail | None]:
-        """Read the full mailbox, asking for a repeat when the frame with it was lost."""
+        """Read the full mailbox; request a repeat if the frame with it was lost."""
         epoch = self.epoch
         for _ in range(4):
             data = yield Read(self.in_address, self.in_size)
@@ -355,7 +355,7 @@ class Mailbox:
         return None
 
     def _ask_again(self) -> Steps[None]:
-        """Toggle the repeat bit and wait for the slave's answer to it (ETG.1000.4 clause 5.6)."""
+        """Toggle the repeat bit and wait for the slave to confirm it (ETG.1000.4 clause 5.6)."""
         self.repeats += 1
         self._asked_again = True
         wanted: int | None = None
@@ -371,7 +371,7 @@ class Mailbox:
             yield Pause(0.0005)
 
     def _is_emergency(self, mail: Mail) -> bool:
-        """True for a CoE emergency (ETG.1000.6 clause 5.6.4), which is reported."""
+        """Return True for a CoE emergency (ETG.1000.6 clause 5.6.4), after reporting it."""
         if mail.protocol != COE or len(mail.payload) < 10:
             return False
         if int.from_bytes(mail.payload[:2], "little") >> 12 != 1:

@@ -1,7 +1,7 @@
-"""Reading many entries of one slave with as few questions as it allows.
+"""Reading many entries of one slave with as few requests as it allows.
 
 Transactions of steps; no I/O. Source: ETG.1000.6 clauses 5.6.2 (complete access) and 5.6.7.4
-(process-data lists: subindex 0 is the number of entries that there are).
+(process-data lists: subindex 0 is the number of entries).
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ def read_items(
 ) -> Steps[list[bytes | DriveError]]:
     """Read many entries; whole objects at once where that is possible and certain.
 
-    One failure does not spoil the others, except that a drive which does not answer at all is
-    not asked for every single entry.
+    A failure does not affect the other entries, except that a drive that does not answer at all is
+    not queried for every single entry.
     """
     results: dict[Item, bytes | DriveError] = {}
     groups: dict[int, list[Item]] = {}
@@ -42,7 +42,7 @@ def read_items(
             yield Gap()
             whole = yield from _read_whole(station, index, sizes)
             results.update({item: _sized(item, whole) for item in members if item[1] in whole})
-        # The count first: entries beyond it are not asked for.
+        # The count first: entries beyond it are not read.
         for item in sorted(members, key=lambda item: item[1]):
             if item in results:
                 continue
@@ -60,7 +60,7 @@ def read_items(
                 if isinstance(error, LinkLost | LinkTimeout):
                     dead = error
                     if not single:
-                        # It answers nothing: that says nothing about whole objects.
+                        # The drive answers nothing, which is no evidence about whole objects.
                         station.single_only.discard(index)
         if index in station.to_prove:
             read = {item[1]: results[item] for item in members}
@@ -73,10 +73,10 @@ def read_items(
 def _not_in_use(
     item: Item, results: dict[Item, bytes | DriveError], members: Sequence[Item]
 ) -> NotInUse | None:
-    """Why an entry of a process-data list beyond its count is not asked for.
+    """Return the error for an entry of a process-data list beyond its count, which is not read.
 
-    It is none of the list: many drives deny that it exists, others answer with what was left
-    there. Read by itself (`coe.upload`) the drive is asked all the same.
+    It does not belong to the list: many drives report that it does not exist, others return old
+    contents. A single read (`coe.upload`) still reads it from the drive.
     """
     index, subindex, _ = item
     if index not in _LISTS or not subindex:
@@ -93,13 +93,13 @@ def _not_in_use(
 
 
 def _sized(item: Item, known: dict[int, bytes]) -> bytes:
-    """A value of a whole object; a count as wide as its manual prints it (1C12h: UINT16)."""
+    """Return a value of a whole object; a count in the width of its manual (1C12h: UINT16)."""
     _, subindex, size = item
     return known[subindex].ljust(size or 0, b"\0") if subindex == 0 else known[subindex]
 
 
 def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> dict[int, int]:
-    """Subindex to length of what is wanted of an object, if reading it at once is worth it."""
+    """Map subindex to length of the requested entries; empty if complete access is not worth it."""
     if not station.complete_access or index in station.single_only:
         return {}
     sizes = {sub: size for _, sub, size in members if sub and size is not None}
@@ -107,7 +107,7 @@ def _sizes_of_whole(station: Station, index: int, members: Sequence[Item]) -> di
 
 
 def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[dict[int, bytes]]:
-    """Subindex to bytes, as far as the drive and the certainty of the layout allow it."""
+    """Map subindex to bytes, as far as the drive and the certainty of the layout allow."""
     try:
         data = yield from coe.upload(station.box, index, 0, complete=True)
     except Rejected as error:
@@ -134,10 +134,10 @@ def _read_whole(station: Station, index: int, sizes: dict[int, int]) -> Steps[di
 
 
 def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Steps[bool]:
-    """Whether the drive's own dictionary has no other subindices than these.
+    """Return whether the drive's own dictionary has no other subindices than these.
 
-    An answer as long as all of them together then holds each of them: one question instead of
-    reading every entry once more.
+    An answer with the total length of all of them then contains each of them: one request instead
+    of reading every entry again.
     """
     last = max(sizes)
     if not station.describes or sorted(sizes) != list(range(1, last + 1)):
@@ -151,7 +151,7 @@ def _is_all_there_is(station: Station, index: int, sizes: dict[int, int]) -> Ste
 
 
 def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[int, bytes]) -> None:
-    """Compare an uncertain whole with the single reads that followed it."""
+    """Compare an uncertain complete access with the single reads that followed it."""
     data = station.to_prove.pop(index)
     if {s: singles.get(s) for s in sizes} == {
         s: part for s, part in coe.split_complete(data, sizes, proven=True).items() if s
@@ -164,7 +164,7 @@ def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[in
 def enumerate_objects(
     station: Station, on_progress: Callable[[int, int], None]
 ) -> Steps[list[Described]]:
-    """Every object and entry that the drive's own dictionary lists."""
+    """Read every object and entry that the drive's own dictionary lists."""
     indices = yield from information.list_objects(station.box)
     found: list[Described] = []
     for number, index in enumerate(indices):

@@ -8,18 +8,18 @@ from collections.abc import Callable
 from drivers.ethercat.wire.steps import Pause, Read, Steps
 
 TRIES = 3
-"""A frame that comes back untouched so often says for certain that nobody answers."""
+"""Number of unprocessed frames that prove that no slave answers."""
 GONE_S = 1.0
-"""For so long frames that do not come back are sent again: they say nothing of the slave."""
+"""Time during which lost frames are repeated [s]: they are no evidence about the slave."""
 _AGAIN_S = 0.005
 
 
 def read_again(
     register: int, size: int, clock: Callable[[], float] = time.monotonic
 ) -> Steps[bytes | None]:
-    """What a register holds; None where nobody answers, or no frame came back for `GONE_S`.
+    """Read a register; None if no slave answers, or if no frame came back for `GONE_S`.
 
-    It is asked once more after that time, as this computer may have stood still meanwhile.
+    It is read once more after that time, as this computer may have been stalled meanwhile.
     """
     deadline = clock() + GONE_S
     untouched = 0

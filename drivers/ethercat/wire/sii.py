@@ -1,9 +1,9 @@
 """The slave information interface (EEPROM): access, identity words, checksum.
 
-Transactions of steps; no I/O. While the master reads, the EEPROM is taken from the slave's own
-processor, and always given back: some drives refuse states without it (AL status 0050h). Every
-frame that does not come back is sent again: after a command that was lost the data register would
-still hold another word.
+Transactions of steps; no I/O. While the master reads, it takes the EEPROM from the slave's own
+processor, and always returns it: some drives refuse states without it (AL status 0050h). Every lost
+frame is sent again: after a lost command the data register would still hold another word.
+
 Source: ETG.1000.4 clause 6.4 (registers 0500h to 0508h), ETG.1000.6 clause 5.4 and ETG.2010.
 """
 
@@ -22,10 +22,10 @@ MAILBOX_WORD = 0x0018
 """Offset and size of the mailbox out, of the mailbox in, and the protocols (ETG.1000.6 5.4)."""
 CONFIG_WORDS = 7
 _CATEGORIES_WORD, _SYNC_MANAGERS, _LAST = 0x0040, 41, 0xFFFF
-"""Type and length in 16-bit words head every category (ETG.1000.6 table 19 and 5.4)."""
+"""Every category starts with type and length in 16-bit words (ETG.1000.6 table 19 and 5.4)."""
 _MOST_CATEGORIES = 64
 _SOEM_BYTES = 4096
-"""SOEM takes every byte behind these for the end of the EEPROM (its EC_MAXEEPBUF)."""
+"""SOEM treats everything beyond this as the end of the EEPROM (its EC_MAXEEPBUF)."""
 
 _OWNER, _CONTROL, _DATA = 0x500, 0x502, 0x508
 _READ, _WRITE, _ENABLE_WRITE = 0x0100, 0x0200, 0x0001
@@ -38,7 +38,7 @@ _LEAST_MAILBOX, _RAM = 16, 0x1000
 
 @dataclass(frozen=True, slots=True)
 class BootMailbox:
-    """Where the mailboxes are in BOOT, seen from the slave: ``out`` is what it receives."""
+    """Position of the mailboxes in BOOT, seen from the slave: ``out`` is what it receives."""
 
     out_address: int
     out_size: int
@@ -47,7 +47,7 @@ class BootMailbox:
 
 
 def checksum(words: bytes) -> int:
-    """CRC-8 of the first seven words: polynomial x⁸+x²+x+1, start value 0xFF (ETG.1000.6 5.4).
+    """Return the CRC-8 of the first seven words: x⁸+x²+x+1, start value 0xFF (ETG.1000.6 5.4).
 
     A slave that finds it wrong ignores its EEPROM at the next start.
     """
@@ -60,7 +60,7 @@ def checksum(words: bytes) -> int:
 
 
 def identity(clock: Callable[[], float]) -> Steps[tuple[int | None, bool]]:
-    """Serial number (None where there is none), and whether the checksum is right.
+    """Read the serial number (None if there is none), and whether the checksum is right.
 
     Errors as `read`.
     """
@@ -71,10 +71,11 @@ def identity(clock: Callable[[], float]) -> Steps[tuple[int | None, bool]]:
 
 
 def read(word: int, count: int, clock: Callable[[], float]) -> Steps[bytes]:
-    """``count`` words from ``word``; two at a time, as every controller can.
+    """Read ``count`` words from ``word``; two at a time, which every controller supports.
 
     Raises:
-        LinkTimeout: the EEPROM stays busy. LinkLost: the station does not answer.
+        LinkTimeout: the EEPROM stays busy.
+        LinkLost: the station does not answer.
         ProtocolError: the controller reports an error.
     """
     data = bytearray()
@@ -104,7 +105,7 @@ def write(word: int, value: int, clock: Callable[[], float]) -> Steps[None]:
 
 
 def write_alias(alias: int, clock: Callable[[], float]) -> Steps[int]:
-    """Write the alias and the checksum that goes with it; returns what reads back."""
+    """Write the alias and the matching checksum; return the alias that reads back."""
     words = bytearray((yield from read(0, CONFIG_WORDS, clock)))
     struct.pack_into("<H", words, 2 * ALIAS_WORD, alias)
     yield from write(ALIAS_WORD, alias, clock)
@@ -113,7 +114,7 @@ def write_alias(alias: int, clock: Callable[[], float]) -> Steps[int]:
 
 
 def boot_mailbox(clock: Callable[[], float]) -> Steps[BootMailbox | None]:
-    """The mailboxes of BOOT; None where the slave names none."""
+    """Read the mailboxes for BOOT; None if the slave states none."""
     reported = BootMailbox(*struct.unpack("<HHHH", (yield from read(BOOT_WORD, 4, clock))))
     sane = (
         min(reported.out_size, reported.in_size) >= _LEAST_MAILBOX and reported.out_address >= _RAM
@@ -122,7 +123,7 @@ def boot_mailbox(clock: Callable[[], float]) -> Steps[BootMailbox | None]:
 
 
 def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
-    """Whether the EEPROM names mailboxes and a protocol for them; False where it cannot be read."""
+    """Return whether the EEPROM states mailboxes and a protocol; False if it cannot be read."""
     try:
         words = struct.unpack("<HHHHH", (yield from read(MAILBOX_WORD, 5, clock)))
     except DriveError:
@@ -133,9 +134,9 @@ def has_mailbox(clock: Callable[[], float]) -> Steps[bool]:
 
 
 def process_data_places(clock: Callable[[], float]) -> Steps[tuple[int, bool]]:
-    """How many sync managers beyond the mailboxes the EEPROM puts into the process memory.
+    """Return how many sync managers beyond the mailboxes the EEPROM puts into process memory.
 
-    0 where it has no such category. The second value shows whether it stands where SOEM reads.
+    0 without such a category. The second value states whether the category is within SOEM's reach.
     Errors as `read`.
     """
     word = _CATEGORIES_WORD
@@ -145,7 +146,7 @@ def process_data_places(clock: Callable[[], float]) -> Steps[tuple[int, bool]]:
             break
         if kind == _SYNC_MANAGERS:
             managers = yield from read(word + 2, words, clock)
-            # Each has eight bytes; the first two are where it begins.
+            # Each has eight bytes; the first two are its start address.
             starts = [start for start, _ in struct.iter_unpack("<H6s", managers[: words // 4 * 8])]
             return sum(start >= _RAM for start in starts[2:]), 2 * (word + 2 + words) <= _SOEM_BYTES
         word += 2 + words
@@ -153,7 +154,7 @@ def process_data_places(clock: Callable[[], float]) -> Steps[tuple[int, bool]]:
 
 
 def _take(clock: Callable[[], float]) -> Steps[None]:
-    """From the slave's processor, by force: one that was switched off holds it for ever."""
+    """Take the EEPROM from the slave's processor by force: one switched off holds it forever."""
     yield from _put(_OWNER, _TAKE, clock)
     yield from _put(_OWNER, _MASTER, clock)
 
@@ -165,12 +166,16 @@ def _give_back() -> Steps[None]:
 
 
 def emulated(clock: Callable[[], float]) -> Steps[bool]:
-    """Whether the drive's processor plays the EEPROM (0502h bit 5); errors as `read`."""
+    """Return whether the drive's processor emulates the EEPROM (0502h bit 5); errors as `read`."""
     return bool((yield from _ready(clock)) & _EMULATED)
 
 
 def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
-    """A chip that still stores the word before does not answer: bit 13, and it is asked again."""
+    """Send a command, repeated while a chip that still stores the last word sets bit 13.
+
+    Raises:
+        ProtocolError: the EEPROM refuses the command.
+    """
     deadline = clock() + _TIMEOUT_S
     while True:
         yield from _send(command, word, clock)
@@ -185,7 +190,7 @@ def _command(command: int, word: int, clock: Callable[[], float]) -> Steps[None]
 def _send(command: int, word: int, clock: Callable[[], float]) -> Steps[None]:
     deadline = clock() + GONE_S
     while True:
-        # It may be carried out although its frame did not come back: never into a busy EEPROM.
+        # A command may be executed although its frame is lost: never send it to a busy EEPROM.
         yield from _ready(clock)
         if (yield Write(_CONTROL, struct.pack("<HI", command, word))) is not None:
             return
@@ -200,13 +205,13 @@ def _ready(clock: Callable[[], float]) -> Steps[int]:
         status = int.from_bytes((yield from _register(_CONTROL, 2, clock)), "little")
         if not status & _BUSY:
             return status
-        if asked > deadline:  # not what was asked before this computer stood still for a moment
+        if asked > deadline:  # not a status read before this computer was stalled
             raise LinkTimeout("ethercat.drive-eeprom-stays-busy", timeout_s=_TIMEOUT_S)
         yield Pause(_POLL_S)
 
 
 def _put(register: int, data: bytes, clock: Callable[[], float]) -> Steps[None]:
-    """Write a register; what was written twice does no harm here."""
+    """Write a register; writing it twice has no effect here."""
     deadline = clock() + GONE_S
     while (yield Write(register, data)) is None:
         if clock() > deadline:

@@ -1,8 +1,8 @@
-"""What a transaction with one station does, step by step, without any I/O.
+"""Steps of a transaction with one station, without any I/O.
 
-A transaction is a generator: it yields `Read`, `Write`, `Pause` and `Gap` and is sent back the
-bytes of a read, ``b""`` for a write that arrived, or None where nobody answered. Whoever owns the
-wire runs the steps, one frame each, so that process data never wait for a mailbox.
+A transaction is a generator: it yields `Read`, `Write`, `Pause` and `Gap` and receives the bytes of
+a read, ``b""`` for a write that arrived, or None without an answer. The owner of the wire runs the
+steps, one frame each, so that process data never wait for a mailbox.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ T = TypeVar("T")
 class Read(NamedTuple):
     """Read ``size`` bytes from an ESC register (FPRD).
 
-    ``may_be_empty``: a frame that came back although nobody answered (an empty mailbox, working
-    counter 0) gives ``b""`` and not None, which is then a lost frame.
+    ``may_be_empty``: a frame that came back without an answer of a slave (an empty mailbox, working
+    counter 0) returns ``b""``; None then means a lost frame.
     """
 
     register: int
@@ -33,13 +33,13 @@ class Write(NamedTuple):
 
 
 class Pause(NamedTuple):
-    """Leave the station alone for a while."""
+    """Send nothing to the station for a while."""
 
     seconds: float
 
 
 class Gap(NamedTuple):
-    """Nothing is under way: here more urgent transactions of the station may come in between."""
+    """No transaction is pending: more urgent ones of the station may be inserted here."""
 
 
 Step = Read | Write | Pause | Gap

@@ -1,7 +1,7 @@
-"""Active faults and warnings of one drive, what resets them, and the record of past ones.
+"""Active faults and warnings of one drive, their reset, and the history of past ones.
 
-Faults come from two sides: protections of the 50 µs loop, as bits, and entries of the profile's
-table that the firmware or a test raises by their code. Both are shown by the same table.
+Faults have two sources: protections of the 50 µs loop, as bits, and entries of the profile's table
+that the firmware or a test raises by their code. Both are reported by the same table.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from profiles.schema import Fault, Profile
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """What the drive measured when a fault came; currents are instantaneous phase values."""
+    """Measured values at the time of a fault; currents are instantaneous phase values."""
 
     bus_v: float = 0.0
     current_u_a: float = 0.0
@@ -34,7 +34,7 @@ class Snapshot:
     inputs: int = 0
     outputs: int = 0
     state_bits: int = 0
-    """Running, forwards, standing: bits 0 to 2 of the M6-L's P11.11."""
+    """Running, forward, standstill: bits 0 to 2 of the M6-L's P11.11."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,26 +51,26 @@ EMPTY: Final = Record(0, 0, Snapshot())
 
 @dataclass
 class FaultLog:
-    """Past faults, newest first. It survives a power cycle, as the drive's own memory does."""
+    """Past faults, newest first. Preserved over a power cycle, as in the drive's own memory."""
 
     size: int = 20
     records: list[Record] = field(default_factory=list)
 
     def add(self, record: Record) -> None:
-        """Keep the newest."""
+        """Add a record, keeping only the newest."""
         self.records = [record, *self.records][: self.size]
 
     def at(self, place: int) -> Record:
-        """A record by its age, 0 the newest; an empty one where there is none."""
+        """Return a record by its age, 0 the newest; an empty one if there is none."""
         return self.records[place] if 0 <= place < len(self.records) else EMPTY
 
     def clear(self) -> None:
-        """Forget all."""
+        """Delete all records."""
         self.records.clear()
 
 
 class Alarms:
-    """What is wrong at this moment."""
+    """The active faults and warnings."""
 
     def __init__(
         self,
@@ -90,34 +90,34 @@ class Alarms:
         """Faults by their code in the table, oldest first."""
         self.warnings: dict[str, Fault] = {}
         self.cleared_by_step: set[str] = set()
-        """Faults whose own remedy was done (an encoder reset …), so that a reset ends them."""
+        """Faults whose own remedy was applied (an encoder reset …), so that a reset ends them."""
 
     def find(self, code: str) -> Fault | None:
-        """An entry of the table by its code."""
+        """Return an entry of the table by its code."""
         return self._table.get(code)
 
     def find_raw(self, error_code: int) -> Fault | None:
-        """The first fault (rather than warning) with this value of 603Fh."""
+        """Return the first fault (not a warning) with this value of 603Fh."""
         return next(
             (f for f in self._table.values() if f.code_raw == error_code and f.kind == "fault"),
             None,
         )
 
     def info_of(self, fault: Fault) -> FaultInfo:
-        """How an entry of the table shows."""
+        """Return how an entry of the table is reported."""
         for info in self._infos.values():
             if info.fault == fault.code:
                 return info
         return FaultInfo(fault.code_raw or 0, fixed=True, fault=fault.code)
 
     def of_bits(self, bits: int) -> list[FaultInfo]:
-        """The reports of protections, lowest bit first."""
+        """Return the reports of protections, lowest bit first."""
         return [
             self._infos.get(1 << i, FaultInfo(0)) for i in range(bits.bit_length()) if bits >> i & 1
         ]
 
     def add(self, infos: Iterable[FaultInfo], snapshot: Callable[[], Snapshot]) -> list[FaultInfo]:
-        """Take in faults; those that are new are recorded and returned."""
+        """Add faults; new ones are recorded and returned."""
         new = [info for info in infos if info.name not in self.active]
         for info in new:
             self.active[info.name] = info
@@ -143,7 +143,7 @@ class Alarms:
         return found
 
     def warn(self, code: str | None, on: bool = True) -> None:
-        """Switch a warning of the table on or off; a code that it lacks does nothing."""
+        """Switch a warning of the table on or off; no effect for a code missing there."""
         fault = self._table.get(code or "")
         if fault is None:
             return
@@ -153,7 +153,7 @@ class Alarms:
             self.warnings.pop(fault.code, None)
 
     def resettable(self) -> bool:
-        """Whether a fault reset ends everything that is active (not asking for live causes)."""
+        """Return whether a fault reset ends all active faults (ignoring live causes)."""
         return all(self._ends(info) for info in self.active.values())
 
     def _ends(self, info: FaultInfo) -> bool:
@@ -165,13 +165,13 @@ class Alarms:
         return fault.reset_by == "special" and fault.code in self.cleared_by_step
 
     def clear(self) -> None:
-        """All faults have been reset."""
+        """Clear all faults after a reset."""
         self.active.clear()
         self.cleared_by_step.clear()
 
 
 def number_of(code: str) -> int:
-    """The number in a code such as Er.013, AL.247, Err4 or 1007; 0 without one."""
+    """Return the number in a code such as Er.013, AL.247, Err4 or 1007; 0 without one."""
     if code.startswith("0x"):
         return int(code, 16)
     digits = "".join(c for c in code if c.isdigit())
@@ -181,7 +181,7 @@ def number_of(code: str) -> int:
 def snapshot_of(
     axis: VirtualAxis, position: float, *, inputs: int = 0, outputs: int = 0
 ) -> Snapshot:
-    """Present measurements. The phase currents are those of a field-oriented q-axis current."""
+    """Return present measurements; phase currents from the field-oriented q-axis current."""
     s = axis.s
     rms = float(s[k.S_CURRENT])
     angle = axis.motor.pole_pairs * axis.angle_rad

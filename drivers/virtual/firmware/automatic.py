@@ -1,13 +1,13 @@
-"""What a drive sets by itself: gains from a rigidity level, notches from a resonance it hears,
-the command notch from a swing that it sees.
+"""Automatic settings of a drive: gains from a rigidity level, notches from a detected resonance,
+the command notch from a detected load oscillation.
 
 M6-L: P09.06, P09.07 (000:3423), P09.08 and P09.22 (000:3427, 000:3444). R6L: P07.00, P07.01
-(002:11088-11109), P07.11 (002:11168). Neither manual prints its table of levels: the bandwidths
-are those that the MMS7's manual prints for its 32 levels (table 38, 004:3003). How a resonance is
-found is not printed either: here it is the strongest line of the speed error above 80 Hz.
+(002:11088-11109), P07.11 (002:11168). Neither manual prints its table of levels: the bandwidths are
+those that the MMS7's manual prints for its 32 levels (table 38, 004:3003). How a resonance is found
+is not printed either: here it is the strongest line of the torque command above 80 Hz.
 
-P09.25 (000:3447-3450): after a move the deviation of the position is watched; where it swings by
-more than P09.28, its frequency becomes P09.26. How, and how long it is watched, is not printed.
+P09.25 (000:3447-3450): after a move the position deviation is monitored; if it oscillates by more
+than P09.28, its frequency becomes P09.26. The method and the time are not printed.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _LOWEST_HZ = 80.0
 _PERIOD_S = 0.25
 _SWING_SAMPLE_S = 0.002
 _SWING_SAMPLES = 400
-"""0.8 s: a swing of 2.5 Hz shows two of its turns."""
+"""0.8 s: two periods of an oscillation at 2.5 Hz."""
 
 
 class Automatic:
-    """Watches its two modes; called after settings have changed and by its own timer."""
+    """Runs the two functions; called after settings have changed and by its own timer."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -49,7 +49,7 @@ class Automatic:
             core.schedule.after(_PERIOD_S, self._watch_swing)
 
     def settings_changed(self) -> None:
-        """Take a new rigidity level."""
+        """Apply a new rigidity level."""
         keys = self._rigidity
         if keys is None:
             return
@@ -113,7 +113,7 @@ class Automatic:
             self._core.apply_settings()
 
     def _resonance_hz(self) -> float | None:
-        """The strongest line of the torque command, if it stands far above the rest."""
+        """Return the strongest line of the torque command if it is far above the rest."""
         trace = self._axis.trace()
         window = np.hanning(trace.size)
         spectrum = np.abs(np.fft.rfft((trace - trace.mean()) * window))
@@ -142,7 +142,7 @@ class Automatic:
         self._core.schedule.after(pause_s, self._watch_swing)
 
     def _take_swing(self, keys: SwingKeys) -> None:
-        """Frequency of the zero crossings, if the swings were large enough."""
+        """Set the frequency of the zero crossings, if the oscillation was large enough."""
         seen = np.array(self._deviations)
         seen -= seen[seen.size // 2 :].mean()
         threshold = self._core.number(keys.threshold) / abs(self._core.units.position_per_rad)

@@ -22,15 +22,15 @@ from drivers.virtual.firmware.settings import (
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
 
-#: Damping ratio of a motor that swings on the hub of its closed brake.
+#: Damping ratio of a motor that oscillates on the hub of its closed brake.
 _HUB_DAMPING = 0.3
 
 
 class VirtualAxis:
     """Mechanics, power stage and loops of one drive.
 
-    Angles are motor radians in the encoder's own frame, which homing never moves. ``events`` is
-    cleared by ``run``.
+    Angles are motor radians in the encoder's own frame, which homing never moves. ``run`` clears
+    ``events``.
     """
 
     def __init__(self, spec: MechanicsSpec, seed: int = 1) -> None:
@@ -42,7 +42,7 @@ class VirtualAxis:
         self._current_loop_hz = 0.0
         self._x = np.zeros(FIRST_LOAD + 2 * len(spec.load))
         self._scratch = np.zeros_like(self._x)
-        #: Called when the shaft was turned by hand: whatever else hangs on it follows.
+        #: Called when the shaft was turned by hand, so that coupled mechanics follow.
         self.placed: Callable[[], None] = lambda: None
         self._loops: LoopSettings | None = None
         self._homing = False
@@ -65,7 +65,7 @@ class VirtualAxis:
 
     # --- running ---------------------------------------------------------------------------
     def run(self, steps: int) -> int:
-        """Advance by up to ``steps`` of 50 µs; returns how many were done before an event."""
+        """Advance by up to ``steps`` of 50 µs; return how many were done before an event."""
         self.s[k.S_EVENTS] = 0.0
         chain = self._chain
         done: int = run(
@@ -75,7 +75,8 @@ class VirtualAxis:
         return done
 
     def share_state(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.uint64]:
-        """Keep angle, speed and torque of the motor in ``x`` [3], which others step from now on.
+        """Store angle, speed and torque of the motor in ``x`` [3], which the caller steps from now
+        on.
 
         Returns the state of this axis' random numbers.
         """
@@ -85,7 +86,7 @@ class VirtualAxis:
 
     @property
     def current_loop_rad_s(self) -> float:
-        """Bandwidth of the current loop."""
+        """Bandwidth of the current loop [rad/s]."""
         return loop_parameters.TURN * self._current_loop_hz
 
     @property
@@ -94,7 +95,7 @@ class VirtualAxis:
         return int(self.s.item(k.S_EVENTS)) & int(self.p.item(k.P_EVENT_MASK))
 
     def listen(self, *events: int) -> None:
-        """Events that end a run, besides fault, stop and alarm clock which always do."""
+        """Set events that end a run, besides fault, stop and alarm clock, which always do."""
         mask = k.EV_FAULT | k.EV_STOPPED | k.EV_ALARM_CLOCK | k.EV_LIMIT
         for event in events:
             mask |= event
@@ -106,13 +107,13 @@ class VirtualAxis:
 
     # --- settings --------------------------------------------------------------------------
     def set_current_loop(self, bandwidth_hz: float) -> None:
-        """Bandwidth of the first-order current loop."""
+        """Set the bandwidth of the first-order current loop."""
         if bandwidth_hz != self._current_loop_hz:
             self._current_loop_hz = bandwidth_hz
             self._chain = discretise(self.spec, loop_parameters.TURN * bandwidth_hz, k.STEP_S)
 
     def apply_loops(self, loops: LoopSettings) -> None:
-        """Gains, filters, feed-forward and notches."""
+        """Set gains, filters, feed-forward and notches."""
         self._loops = loops
         self.set_current_loop(loops.current_loop_hz)
         first, second = loops.first, loops.second
@@ -128,40 +129,40 @@ class VirtualAxis:
             self.apply_loops(self._loops)
 
     def apply_protections(self, limits: ProtectionSettings) -> None:
-        """Thresholds of the protections."""
+        """Set thresholds of the protections."""
         resistor = self.spec.supply.braking_resistor
         loop_parameters.write_protections(self.p, limits, self.motor.rated_torque_nm, resistor)
         self._braked = limits.holding_brake or self.spec.motor.brake
         self.release_brake(self._brake_released)
 
     def apply_impedance(self, settings: ImpedanceSettings) -> None:
-        """Gains of the impedance controller."""
+        """Set gains of the impedance controller."""
         loop_parameters.write_impedance(self.p, settings)
 
     def apply_windows(
         self, position_rad: float, speed_rad_s: float, zero_rad_s: float, following_rad: float
     ) -> None:
-        """Windows of target reached, zero speed and following error."""
+        """Set windows of target reached, zero speed and following error."""
         self.p[k.P_POSITION_WINDOW], self.p[k.P_SPEED_WINDOW] = position_rad, speed_rad_s
         self.p[k.P_ZERO_SPEED], self.p[k.P_FOLLOWING_WINDOW] = zero_rad_s, following_rad
 
     def set_limits(self, positive_nm: float, negative_nm: float, speed_rad_s: float) -> None:
-        """Torque limits (both as magnitudes) and the largest speed reference."""
+        """Set torque limits (both as magnitudes) and the largest speed reference."""
         self.p[k.P_T_MAX], self.p[k.P_T_MIN] = positive_nm, -negative_nm
         self.p[k.P_MAX_SPEED] = speed_rad_s
 
     def set_signals(self, *, forced: int, forced_on: int, inverted: int) -> None:
-        """Switches that are not wired (forced to a level) or wired the other way round."""
+        """Set switches that are not wired (forced to a level) or wired inversely."""
         self.p[k.P_SIGNAL_FORCED], self.p[k.P_SIGNAL_FORCED_ON] = forced, forced_on
         self.p[k.P_SIGNAL_INVERTED] = inverted
 
     def watch_signals(self, mask: int) -> None:
-        """Raise EV_SIGNAL as soon as one of these switches changes; 0 watches none."""
+        """Raise EV_SIGNAL as soon as one of these switches changes; 0 disables this."""
         self.p[k.P_WATCH_MASK] = mask
         self.p[k.P_WATCH_VALUE] = int(self.s[k.S_SIGNALS]) & mask
 
     def watch_stall(self, torque_nm: float, time_s: float, speed_rad_s: float) -> None:
-        """Raise EV_STALL after this long at this torque below this speed; 0 Nm switches off."""
+        """Raise EV_STALL after this time at this torque below this speed; 0 Nm disables this."""
         self.s[k.S_STALL_T] = 0.0
         self.p[k.P_STALL_NM], self.p[k.P_STALL_S] = torque_nm, time_s
         self.p[k.P_STALL_SPEED] = speed_rad_s
@@ -181,7 +182,7 @@ class VirtualAxis:
         return bool(self.p[k.P_LOOP] != k.LOOP_OFF)
 
     def power_off(self, dynamic_brake: bool = False) -> None:
-        """Open the power stage: the axis coasts (or the holding brake grips).
+        """Switch the power stage off: the axis coasts (or the holding brake closes).
 
         With ``dynamic_brake`` the windings are shorted: Kt²/(3R) Nm per rad/s.
         """
@@ -191,12 +192,12 @@ class VirtualAxis:
         self.p[k.P_DYNAMIC_BRAKE] = shorted if dynamic_brake else 0.0
 
     def await_standstill(self) -> None:
-        """Raise EV_STOPPED as soon as the axis, which is not powered, has stopped."""
+        """Raise EV_STOPPED as soon as the axis, which is not powered, is at standstill."""
         self.s[k.S_STOPPED] = 0.0
         self.p[k.P_STOPPING] = 1.0
 
     def release_brake(self, released: bool) -> None:
-        """Whether the holding brake is kept open, with or without power."""
+        """Set whether the holding brake is kept open, with or without power."""
         self._brake_released = released
         grips = self._braked and not released
         motor = self.spec.motor
@@ -207,11 +208,11 @@ class VirtualAxis:
         self.p[k.P_BRAKE_DAMPING] = 2 * _HUB_DAMPING * math.sqrt(stiffness * motor.inertia_kgm2)
 
     def close_brake(self, closed: bool) -> None:
-        """The holding brake, apart from the power stage (it grips without power in any case)."""
+        """Close or release the brake with power on (without power it is closed in any case)."""
         self.p[k.P_BRAKE_CLOSED] = float(closed)
 
     def hold(self, at_rad: float | None = None) -> None:
-        """Close the position loop at this angle, or where the axis is, from its speed."""
+        """Close the position loop at this angle, or at the present one, from the present speed."""
         moving = bool(self.p[k.P_LOOP] == k.LOOP_POSITION)
         self._begin(k.GEN_POSITION, k.LOOP_POSITION)
         if not moving:
@@ -222,7 +223,7 @@ class VirtualAxis:
             self.s[k.S_V_DEMAND] = 0.0
 
     def move(self, target_rad: float, speed: float, acceleration: float, braking: float) -> None:
-        """Trapezoidal move from the present demand to an absolute angle; rad/s, rad/s²."""
+        """Start a trapezoidal move from the present demand to an absolute angle; rad/s, rad/s²."""
         if self.p[k.P_LOOP] != k.LOOP_POSITION:
             self.s[k.S_P_DEMAND] = self.s[k.S_THETA]
             self.s[k.S_V_DEMAND] = self.s[k.S_OMEGA] if self.powered else 0.0
@@ -231,14 +232,14 @@ class VirtualAxis:
         self.p[k.P_V_MAX], self.p[k.P_ACC], self.p[k.P_DEC] = speed, acceleration, braking
 
     def run_velocity(self, speed: float, acceleration: float, braking: float) -> None:
-        """Ramp to a speed and keep it."""
+        """Ramp to a speed and hold it."""
         if self.p[k.P_LOOP] not in (k.LOOP_SPEED, k.LOOP_POSITION):
             self.s[k.S_V_DEMAND] = self.s[k.S_OMEGA]
         self._begin(k.GEN_VELOCITY, k.LOOP_SPEED)
         self.p[k.P_V_TARGET], self.p[k.P_ACC], self.p[k.P_DEC] = speed, acceleration, braking
 
     def run_torque(self, torque_nm: float, slope_nm_s: float) -> None:
-        """Ramp to a torque and keep it."""
+        """Ramp to a torque and hold it."""
         if self.p[k.P_LOOP] != k.LOOP_TORQUE:
             self.s[k.S_T_DEMAND] = self.s[k.S_TORQUE_COMMAND]
         self._begin(k.GEN_TORQUE, k.LOOP_TORQUE)
@@ -256,7 +257,7 @@ class VirtualAxis:
         s[k.S_IP_LEFT] = 0.0
 
     def set_cyclic(self, angle_rad: float, speed: float, torque_nm: float, steps: int) -> None:
-        """New cyclic setpoints, reached linearly in ``steps`` of 50 µs (004:7618-7621)."""
+        """Set new cyclic setpoints, reached linearly in ``steps`` of 50 µs (004:7618-7621)."""
         s, item = self.s, self.s.item
         s[k.S_IP_POSITION_INC] = (angle_rad - item(k.S_IP_POSITION)) / steps
         s[k.S_IP_SPEED_INC] = (speed - item(k.S_IP_SPEED)) / steps
@@ -273,7 +274,7 @@ class VirtualAxis:
             s[k.S_ROUGH_WAIT] = float(self._jitter.integers(0, int(p[k.P_ROUGH_JITTER_STEPS]) + 1))
 
     def stop_ramp(self, braking: float) -> None:
-        """Brake to standstill at this deceleration; EV_STOPPED shows when."""
+        """Brake to standstill at this deceleration; EV_STOPPED marks the end."""
         loop = self.p[k.P_LOOP]
         if loop == k.LOOP_POSITION:
             self._begin(k.GEN_POSITION, k.LOOP_POSITION)
@@ -285,18 +286,18 @@ class VirtualAxis:
         self.p[k.P_STOPPING], self.p[k.P_STOP_DEC] = 1.0, braking
 
     def stop_by_torque_slope(self, slope_nm_s: float) -> None:
-        """Reduce the torque at this slope; EV_STOPPED shows when the axis is at standstill."""
+        """Reduce the torque at this slope; EV_STOPPED marks standstill."""
         self.run_torque(0.0, slope_nm_s)
         self.p[k.P_STOPPING] = 1.0
 
     def stop_by_torque(self, torque_nm: float) -> None:
-        """Brake with a constant torque (0 coasts under power); EV_STOPPED shows when."""
+        """Brake with a constant torque (0 coasts under power); EV_STOPPED marks standstill."""
         self._begin(k.GEN_TORQUE_STOP, k.LOOP_TORQUE)
         self.p[k.P_STOP_TORQUE] = torque_nm
         self.p[k.P_STOPPING] = 1.0
 
     def place(self, angle_rad: float) -> None:
-        """Turn the shaft by hand to an angle, without power and at standstill; the loads follow."""
+        """Set the shaft to an angle by hand, without power and at standstill; the loads follow."""
         x, s = self._x, self.s
         x[:] = 0.0
         x[0] = angle_rad
@@ -307,7 +308,7 @@ class VirtualAxis:
         self.placed()
 
     def clear_faults(self) -> None:
-        """Forget latched faults and their timers."""
+        """Clear latched faults and their timers."""
         for name in (
             k.S_FAULTS,
             k.S_OVERLOAD_T,
@@ -318,7 +319,7 @@ class VirtualAxis:
             self.s[name] = 0.0
 
     def live_faults(self) -> int:
-        """Faults whose cause is present now, as F_* bits; timed ones need time to come back."""
+        """Return faults whose cause is present now, as F_* bits; timed ones need time to recur."""
         p, s, present = self.p, self.s, 0
         for bit, condition in (
             (k.F_UNDER_VOLTAGE, s[k.S_VOLTAGE] < p[k.P_UVLO_V]),
@@ -333,7 +334,7 @@ class VirtualAxis:
 
     @property
     def loops(self) -> LoopSettings | None:
-        """The loops as they are set now, in SI units."""
+        """The present loop settings, in SI units."""
         return self._loops
 
     # --- readings --------------------------------------------------------------------------
@@ -358,7 +359,7 @@ class VirtualAxis:
         return float(self.s[k.S_TORQUE])
 
     def trace(self) -> npt.NDArray[np.float64]:
-        """The last 4096 torque commands, oldest first, one per 50 µs [Nm]."""
+        """Return the last 4096 torque commands, oldest first, one per 50 µs [Nm]."""
         ring = self.s[k.S_TRACE : k.S_TRACE + k.TRACE_STEPS]
         return np.roll(ring, -(int(self.s[k.S_STEP]) % k.TRACE_STEPS))
 
@@ -368,5 +369,5 @@ class VirtualAxis:
         return int(self.s[k.S_FAULTS])
 
     def raise_fault(self, bit: int) -> None:
-        """Latch a fault as if its protection had acted."""
+        """Latch a fault as if its protection had tripped."""
         self.s[k.S_FAULTS] = float(self.faults | bit)

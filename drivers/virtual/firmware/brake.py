@@ -1,8 +1,8 @@
-"""The holding brake of a motor that has one, in the order of its family (000:1360, 002:8117).
+"""The holding brake of a motor, with the sequence of its family (000:1360, 002:8117).
 
 Enabling: power on, the brake opens, then commands are accepted. Disabling at standstill: the brake
-closes and the power stays on for its time; in motion the axis stops first. A fault closes it at
-once, with the power stage.
+closes and the power stays on for a set time; in motion the axis stops first. A fault closes it at
+once, together with switching off the power stage.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class HoldingBrake:
         self._bus: bool | None = None
 
     def times(self) -> BrakeTimes | None:
-        """None without a brake on the motor, whatever the parameters say."""
+        """Return the times, None without a brake on the motor, whatever the parameters state."""
         return self._core.family.brake(self._core.od) if self._axis.spec.motor.brake else None
 
     def _without_current(self) -> bool:
-        """Its coil gets none, whatever the drive does: no supply, or no output for it."""
+        """Return whether its coil is never energised: no supply, or no output assigned to it."""
         motor, core = self._axis.spec.motor, self._core
         if not motor.brake or not motor.brake_supplied:
             return motor.brake
@@ -42,7 +42,7 @@ class HoldingBrake:
 
     @property
     def moving(self) -> bool:
-        """Opening or closing, and commands wait for it."""
+        """Opening or closing, so that commands have to wait."""
         late = self._axis.spec.rough_feedback.brake_opens_s is not None
         return self._timer is not None and not late
 
@@ -54,7 +54,7 @@ class HoldingBrake:
         return self._axis.powered and self._axis.p[k.P_BRAKE_CLOSED] == 0.0
 
     def follow_bus(self, applied: bool | None) -> None:
-        """The bus applies (True) or releases the brake, or leaves it to the drive (None)."""
+        """Apply (True) or release the brake by the bus, or leave it to the drive (None)."""
         if applied == self._bus:
             return
         self.cancel()
@@ -64,27 +64,27 @@ class HoldingBrake:
         self._axis.close_brake(applied is True or dead)
 
     def grip(self) -> None:
-        """A fault applies the brake, whatever the bus says (001:940)."""
+        """Apply the brake after a fault, whatever the bus commands (001:940)."""
         if self._bus is not None:
             self.follow_bus(True)
 
     def cancel(self) -> None:
-        """Something else happens to the axis."""
+        """Cancel the sequence, as the axis gets another command."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
 
     def open(self, ready: Callable[[], None]) -> bool:
-        """Hold the axis while it opens; False where there is none to wait for."""
+        """Hold the axis while the brake opens; return False if there is nothing to wait for."""
         if self._bus is not None:
             return False
         if self._without_current():
-            # The drive has no data of it, and takes commands against a closed brake.
+            # The drive has no data on the brake, and accepts commands against the closed brake.
             self._axis.close_brake(True)
             return False
         late_s = self._axis.spec.rough_feedback.brake_opens_s
         if late_s is not None and self._axis.spec.motor.brake:
-            # Commands are accepted at once, against a brake that still grips.
+            # Commands are accepted at once, against a brake that is still closed.
             self._axis.close_brake(True)
             self._timer = self._core.schedule.after(late_s, self._opened)
             return False
@@ -112,7 +112,7 @@ class HoldingBrake:
         self._axis.close_brake(False)
 
     def close(self, enabled_again: Callable[[], bool]) -> bool:
-        """Close it and keep the power for its time; False where there is none."""
+        """Close it and keep the power on for its time; return False without a brake."""
         times = None if self._bus is not None else self.times()
         if times is None or not self._axis.powered:
             return False

@@ -1,4 +1,4 @@
-"""Commands that a drive takes as writes of certain values (200Dh of the MMS7 and its like)."""
+"""Commands that a drive accepts as writes of certain values (200Dh of the MMS7 and others)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from profiles.schema import Raw
 
 
 class Commands:
-    """Save, restore, reset, zero and the rest, by the names that `Traits.commands` uses."""
+    """Save, restore, reset, zero and others, by the names in `Traits.commands`."""
 
     def __init__(
         self, core: Core, control: DeviceControl, storage: Storage, reset: Callable[[], None]
@@ -45,7 +45,7 @@ class Commands:
         )
 
     def setters(self) -> dict[str, Callable[[Raw], None]]:
-        """What reacts to writes, by parameter key."""
+        """Return the functions that react to writes, by parameter key."""
         traits = self._core.family.traits
         found = {key: self._setter(key, actions) for key, actions in traits.commands.items()}
         if traits.jog is not None and traits.jog.trigger is not None:
@@ -70,10 +70,10 @@ class Commands:
             nonlocal last
             before, last = last, int(value)
             if last == 0 and "identify_poles" in actions.values() and self._control.poles.active:
-                # What ends it is not printed; its parameter going back is mistaken for the end.
+                # How it is ended is not printed; resetting its parameter is assumed to end it.
                 self._control.poles.cancel()
                 self._core.axis.power_off()
-            # A trigger that stays acts on its change only (003:411-414).
+            # A trigger that keeps its value acts only on a change (003:411-414).
             if last == 0 or (not self_clearing and last == before):
                 return
             name = actions.get(int(value))
@@ -118,7 +118,7 @@ class Commands:
             self._raise(keys.fault)
 
     def _clear_encoder_fault(self) -> None:
-        """P12.05 of the R6L ends AL.221 and AL.222 (002:1681)."""
+        """Clear AL.221 and AL.222, as P12.05 of the R6L does (002:1681)."""
         self._control.alarms.cleared_by_step |= {"AL.221", "AL.222"}
         self._control.faults.reset()
 

@@ -1,4 +1,4 @@
-"""CiA 402 device control: states, option codes, halts and the way into and out of faults."""
+"""CiA 402 device control: states, option codes, halts, and entering and leaving faults."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STOP_OPTIONS: Final = {Command.SHUTDOWN: "605B:00", Command.SWITCH_ON: "605C:00
 
 
 class DeviceControl:
-    """Follows the control word, stops as the option codes say and reacts to faults."""
+    """Follows the control word, stops according to the option codes, and reacts to faults."""
 
     def __init__(self, core: Core, log: FaultLog | None = None) -> None:
         self._core = core
@@ -38,7 +38,7 @@ class DeviceControl:
         self.faults = Faults(core, self, log)
         self.alarms = self.faults.alarms
         self.on_disabled: list[Callable[[], None]] = []
-        """Reported whenever the power stage has been switched off."""
+        """Called whenever the power stage has been switched off."""
         self._stops = Stopping(core, self.modes)
         self.brake = HoldingBrake(core)
         self.jog = TerminalJog(core, self.brake, self._free)
@@ -53,7 +53,7 @@ class DeviceControl:
 
     # --- commands --------------------------------------------------------------------------
     def set_control_word(self, word: int) -> None:
-        """A new control word, in force at once."""
+        """Apply a new control word at once."""
         before, self.control_word = self.control_word, word
         if word & ~before & _FAULT_RESET:
             self.faults.reset()
@@ -74,7 +74,7 @@ class DeviceControl:
         self.modes.on_control_word(word, before)
 
     def set_mode(self, mode: int) -> None:
-        """6060h changed; a running axis changes over without a bump."""
+        """Handle a change of 6060h; a running axis changes over without a bump."""
         if mode == self.modes.mode:
             return
         if self.state is State.OPERATION_ENABLED and self._after_stop is None:
@@ -91,7 +91,7 @@ class DeviceControl:
         new = next_state(self.state, command)
         if new is self.state:
             return
-        # A ramp under way ends before anything but "disable voltage" or a quick stop counts.
+        # Until a ramp in progress ends, only "disable voltage" or a quick stop is accepted.
         urgent = command is Command.DISABLE_VOLTAGE or (
             command is Command.QUICK_STOP and self.state is State.OPERATION_ENABLED
         )
@@ -130,7 +130,7 @@ class DeviceControl:
         self.modes.start(self.modes.mode)
 
     def _free(self) -> bool:
-        """Whether nobody commands the axis, so that the drive may move it by itself."""
+        """Return whether the axis is not commanded, so that the drive may move it by itself."""
         return self.state in _AT_STANDSTILL and self._after_stop is None and not self.brake.moving
 
     def _pole_failed(self, code: str) -> None:
@@ -170,18 +170,18 @@ class DeviceControl:
 
     # --- stopping --------------------------------------------------------------------------
     def _stop(self, option: int, done: Callable[[], None]) -> None:
-        """Stop as options 0 to 4 of 605Ah–605Eh say, then call ``done``."""
+        """Stop according to options 0 to 4 of 605Ah–605Eh, then call ``done``."""
         self._after_stop = done
         self._finish_now(self._stops.begin(option))
 
     def _finish_now(self, begun: bool) -> None:
-        """Go on at once where nothing had to be waited for."""
+        """Continue at once if there is nothing to wait for."""
         if not begun and self._after_stop is not None:
             done, self._after_stop = self._after_stop, None
             done()
 
     def _switch_off(self, *, at_once: bool = False) -> None:
-        """Power stage off; a brake closes first where the family lets it (000:1383)."""
+        """Switch the power stage off; a brake closes first if the family allows it (000:1383)."""
         self._after_stop = None
         self._halted = False
         self.modes.end()
@@ -205,7 +205,7 @@ class DeviceControl:
             self._command(decode(self.control_word))
 
     def _hold_stopped(self) -> None:
-        # Torque modes have no position lock where 6087h has reduced the torque (000:3020).
+        # Torque modes have no position lock after 6087h has reduced the torque (000:3020).
         if not (self._traits.stops.slope_in_torque and self.modes.mode in (PT, CST)):
             self._axis.hold()
 
@@ -225,11 +225,11 @@ class DeviceControl:
             self._axis.stop_by_torque(0.0)
         else:
             self._stop(option, self._hold_stopped)
-            # A halt leaves the drive free to take any further command at once.
+            # A halt leaves the drive free to accept any further command at once.
             self._halt_done, self._after_stop = self._after_stop, None
 
     def emergency_stop(self, on: bool) -> None:
-        """The emergency stop input; what it does is the family's (001:874, 000:3014)."""
+        """Handle the emergency stop input; its action depends on the family (001:874, 000:3014)."""
         self._emergency = on
         emergency = self._traits.stops.emergency
         if emergency is None or not on or self.state is not State.OPERATION_ENABLED:
@@ -244,7 +244,7 @@ class DeviceControl:
 
     # --- events ----------------------------------------------------------------------------
     def on_events(self, events: int) -> None:
-        """React to what ended a run of the 50 µs loop."""
+        """React to the events that ended a run of the 50 µs loop."""
         if events & k.EV_ALARM_CLOCK:
             self._core.schedule.run()
         if events & k.EV_FAULT:
@@ -282,7 +282,7 @@ class DeviceControl:
 
     # --- faults ----------------------------------------------------------------------------
     def trip(self, new: list[FaultInfo]) -> None:
-        """Faults came: stop as the family does, then "fault"."""
+        """React to faults: stop as the family does, then enter "fault"."""
         self.identification.stop()
         self.jog.cancel()
         self.poles.cancel()
@@ -300,20 +300,20 @@ class DeviceControl:
         self.faults.reacted()
 
     def stop_on_warning(self) -> None:
-        """A protection that brakes and holds instead of tripping."""
+        """Brake and hold for a protection that does not trip."""
         self._leave_operation(State.QUICK_STOP_ACTIVE, Command.QUICK_STOP)
 
     def retry_enable(self) -> None:
-        """The fault was reset by the drive itself: on again, if that is still wanted."""
+        """Enable again after the drive itself reset the fault, if still commanded."""
         if decode(self.control_word) is Command.ENABLE:
             self.state = State.SWITCHED_ON
             self._enter_operation()
 
     def communication_lost(self) -> None:
-        """EtherCAT or CAN traffic ended while the servo is on.
+        """React to the end of EtherCAT or CAN traffic while the servo is on.
 
-        A drive with 6007h does what that says (CiA 402-2 object 6007h); the others report a
-        fault (004:4903-4917).
+        A drive with 6007h acts according to it (CiA 402-2 object 6007h); the others report a fault
+        (004:4903-4917).
         """
         fault = self._traits.communication_fault
         if self.state not in _OPERATING or not fault:
@@ -329,7 +329,7 @@ class DeviceControl:
 
     # --- status ----------------------------------------------------------------------------
     def status_word(self) -> int:
-        """6041h; "voltage enabled" and "remote" are always set (004:6798-6806)."""
+        """Return 6041h; "voltage enabled" and "remote" are always set (004:6798-6806)."""
         traits = self._traits
         if traits.status == "echo":
             return self._echo_status()
@@ -357,11 +357,11 @@ class DeviceControl:
 
     @property
     def homed(self) -> bool:
-        """A homing has succeeded since power-on."""
+        """Whether a homing has succeeded since power-on."""
         return self.modes.homing.attained or self.modes.homing.was_attained
 
     def _echo_status(self) -> int:
-        """Status word of the DS_C (003:298-308): bits 0 to 2 echo the state."""
+        """Return the status word of the DS_C (003:298-308): bits 0 to 2 echo the state."""
         word = {
             State.READY: 1,
             State.SWITCHED_ON: 3,

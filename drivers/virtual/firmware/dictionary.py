@@ -1,8 +1,8 @@
 """The object dictionary of a virtual drive: storage and the rules of access.
 
-Aborts follow CiA 301 table 22: no object or subindex, read-only, write-only, wrong length, out
-of range. A parameter that takes effect later keeps two values: the one that was written (and is
-read back) and the one in use.
+Aborts follow CiA 301 table 22: no object or subindex, read-only, write-only, wrong length, out of
+range. A parameter that takes effect later has two values: the written one (which is read back) and
+the one in use.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Number = int | float
 
 
 class Cell(Protocol):
-    """The effective value of a number, for who looks at it in every cycle."""
+    """The effective value of a number, for code that reads it in every cycle."""
 
     @property
     def active(self) -> Number:
@@ -48,18 +48,18 @@ class Cell(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Constant:
-    """Stands for an entry that this drive does not have."""
+    """Replaces an entry that this drive does not have."""
 
     active: Number
 
 
 def code_of(index: int, subindex: int) -> int:
-    """One number for index and subindex."""
+    """Return one number for index and subindex."""
     return index << 8 | subindex
 
 
 class Entry:
-    """One object: its description, written and effective value, and who computes or reacts."""
+    """One object: its description, written and effective value, and its getter and setter."""
 
     __slots__ = ("active", "getter", "key", "parameter", "setter", "storage", "value", "wrap")
 
@@ -76,11 +76,11 @@ class Entry:
 
     @property
     def size(self) -> int:
-        """Bytes; text and octets as long as they are."""
+        """Size in bytes; for text and octets their present length."""
         return self.storage.size if self.storage else len(self.encoded())
 
     def default(self) -> Raw:
-        """Printed default, brought into the type's range, or nothing at all."""
+        """Return the printed default, limited to the type's range, or 0 or "" without one."""
         raw = self.parameter.default_raw
         if self.storage is None:
             return raw if isinstance(raw, str) else ""
@@ -92,19 +92,19 @@ class Entry:
         return min(max(int(raw), low), high)
 
     def fit(self, number: Number) -> int:
-        """An integer that fits the type, wrapping around as a counter does."""
+        """Return an integer that fits the type, wrapping around as a counter does."""
         low, span = self.wrap or (0, 1)
         return (int(number) - low) % span + low
 
     def current(self) -> Raw:
-        """Value a reader sees."""
+        """Return the value for a reader."""
         if self.getter is None:
             return self.value
         number = self.getter()
         return number if self.wrap is None else self.fit(number)
 
     def encoded(self) -> bytes:
-        """Value a reader sees, little endian."""
+        """Return the value for a reader, little endian."""
         value = self.current()
         if self.storage is not None:
             return self.storage.pack(value)
@@ -113,7 +113,7 @@ class Entry:
         return str(value).encode("utf-8")
 
     def decode(self, data: bytes) -> Raw:
-        """Bytes of a writer to a value inside the printed range, or SdoAbort."""
+        """Convert a writer's bytes to a value inside the printed range, or raise SdoAbort."""
         if self.storage is None:
             return data.hex(" ") if self.parameter.type == "OCTETS" else data.decode("utf-8")
         if len(data) != self.storage.size:
@@ -132,13 +132,13 @@ class Entry:
 
 
 class ObjectDictionary:
-    """Every entry of a profile, plus what CiA 301 demands and the manual leaves to it."""
+    """Every entry of a profile, plus those required by CiA 301 that are not in the manual."""
 
     def __init__(self, profile: Profile, station: int) -> None:
         self.entries: dict[int, Entry] = {}
         self.numbered: dict[str, Entry] = {}
         self.writes = 0
-        """Counts accesses that wrote, so that process data notice them."""
+        """Number of accesses that wrote, so that process data detect changes."""
         for parameter in profile.parameters:
             self._add(parameter)
         for parameter in _standard_objects(profile, station):
@@ -177,24 +177,24 @@ class ObjectDictionary:
         return code in self.entries
 
     def find(self, index: int, subindex: int) -> Entry:
-        """Entry, or SdoAbort with the code that distinguishes object from subindex."""
+        """Return an entry, or raise SdoAbort with the code for a missing object or subindex."""
         entry = self.entries.get(index << 8 | subindex)
         if entry is None:
             raise SdoAbort(ABORT_NO_SUBINDEX if index in self._subindices else ABORT_NO_OBJECT)
         return entry
 
     def indices(self) -> list[int]:
-        """All indices, ascending."""
+        """Return all indices, ascending."""
         return list(self._subindices)
 
     def subindices(self, index: int) -> list[int]:
-        """All subindices of an object, ascending."""
+        """Return all subindices of an object, ascending."""
         if index not in self._subindices:
             raise SdoAbort(ABORT_NO_OBJECT)
         return list(self._subindices[index])
 
     def info(self, index: int, subindex: int) -> EntryInfo:
-        """What the SDO information service shows."""
+        """Return the description for the SDO information service."""
         entry = self.find(index, subindex)
         parameter = entry.parameter
         return EntryInfo(
@@ -208,18 +208,18 @@ class ObjectDictionary:
         )
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an object."""
+        """Return the value of an object."""
         entry = self.find(index, subindex)
         if entry.parameter.access == "wo":
             raise SdoAbort(ABORT_WRITE_ONLY)
         return entry.encoded()
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """Write an object; its setter may still refuse, and then nothing changes."""
+        """Write an object; if its setter refuses, nothing changes."""
         self.write_entry(self.find(index, subindex), data)
 
     def write_entry(self, entry: Entry, data: bytes) -> None:
-        """The same for an entry that has been found."""
+        """Write as `write`, for an entry that has been found."""
         if entry.parameter.access == "ro":
             raise SdoAbort(ABORT_READ_ONLY)
         try:
@@ -229,7 +229,7 @@ class ObjectDictionary:
         self.assign(entry, value)
 
     def assign(self, entry: Entry, value: Raw) -> None:
-        """Store a checked value and notify whoever reacts to it."""
+        """Store a checked value and call the setter."""
         self.writes += 1
         before, before_active = entry.value, entry.active
         entry.value = value
@@ -243,34 +243,34 @@ class ObjectDictionary:
                 raise
 
     def number(self, key: str, default: Number = 0) -> Number:
-        """Effective value of a numeric entry, or ``default`` where this drive has none."""
+        """Return the effective value of a numeric entry, or ``default`` if this drive has none."""
         entry = self.numbered.get(key)
         if entry is None or isinstance(entry.active, str):
             return default
         return entry.active
 
     def cell(self, key: str, default: Number = 0) -> Cell:
-        """What `number` shows, looked up once: numeric entries stay numeric for good."""
+        """Return the source of `number`, looked up once: numeric entries always stay numeric."""
         entry = self.numbered.get(key)
         if entry is None or isinstance(entry.active, str):
             return _Constant(default)
         return cast("Cell", entry)
 
     def put(self, key: str, value: Raw) -> None:
-        """The drive itself changes a value, in storage and in effect."""
+        """Change a value by the drive itself, in storage and in effect."""
         entry = self.numbered.get(key)
         if entry is not None:
             entry.value = entry.active = value
 
     def make_own(self, key: str, value: Raw) -> None:
-        """What this one drive has from the factory, and after every start."""
+        """Set a value of this particular drive from the factory, also used after every start."""
         entry = self.numbered.get(key)
         if entry is not None:
             entry.parameter = entry.parameter.model_copy(update={"default_raw": value})
             entry.value = entry.active = value
 
     def load(self, values: Mapping[str, Raw]) -> None:
-        """Power-on: take over stored values, all in effect; those that no longer fit are left."""
+        """Load stored values at power-on, all in effect; those that no longer fit are skipped."""
         for key, value in values.items():
             entry = self.numbered.get(key)
             if entry is None:
@@ -285,7 +285,7 @@ class ObjectDictionary:
             entry.value = entry.active = value
 
     def activate(self, *effective: str) -> None:
-        """Written values of these effective classes come into use."""
+        """Apply written values of these effective classes."""
         for entry in self:
             if entry.parameter.effective in effective:
                 entry.active = entry.value
@@ -306,10 +306,10 @@ def _constant(index: int, subindex: int, name: str, kind: str, value: Raw) -> Pa
 
 
 def _revision(profile: Profile) -> int:
-    """The printed revision; where a manual prints no identity, a number of the family's own.
+    """Return the printed revision, or a number specific to a family without printed identity.
 
-    Masters take slaves of one vendor, product and revision for alike: SOEM reads the EEPROM of the
-    first only, and would ask an M6-L for the complete access that an MMS7 before it offers.
+    Masters treat slaves of one vendor, product and revision as equal: SOEM reads the EEPROM of the
+    first only, and would use on an M6-L the complete access that an MMS7 before it offers.
     """
     identity = profile.identity
     if identity.revision is not None or identity.product_code is not None:
@@ -318,7 +318,7 @@ def _revision(profile: Profile) -> int:
 
 
 def _standard_objects(profile: Profile, station: int) -> list[Parameter]:
-    """Objects of CiA 301 and ETG.1000.6 that a master expects of every drive."""
+    """Return objects of CiA 301 and ETG.1000.6 that a master expects of every drive."""
     identity = profile.identity
     return [
         _constant(0x1000, 0, "Device type", "UINT32", 0x00020192),

@@ -1,4 +1,4 @@
-"""A virtual drive by the name of its family."""
+"""Creation of a virtual drive by the name of its family."""
 
 from __future__ import annotations
 
@@ -22,13 +22,14 @@ def make_device(
     nvm_dir: Path | None = None,
     station: int = 1,
 ) -> Device:
-    """A drive of this family with its own NVM file ``<drive>-<station>.json`` in ``nvm_dir``.
+    """Create a drive of this family with its own NVM file ``<drive>-<station>.json``.
 
-    One of an imported profile behaves by CiA 402 and has the objects of the maker's file; what
-    the maker's own objects do is in no file, so they only keep their values.
+    A drive of an imported profile behaves according to CiA 402 and has the objects of the
+    manufacturer's file; the function of the manufacturer's own objects is not in the file, so they
+    only keep their values.
 
     ``drive`` is a family's name or its loaded profile; ``mechanics`` a checked spec, the plain
-    table of a bench file, or nothing for the standard axis.
+    table of a bench file, or None for the standard axis. ``nvm_dir`` is the folder of the NVM file.
 
     Raises:
         ValueError: no virtual drive of this family, or mechanics that are not valid.
@@ -63,13 +64,13 @@ def make_device(
     )
 
 
-#: Units that the virtual firmware computes in; any other would be a wrong speed in silence.
+#: Units in which the virtual firmware computes; any other would silently be a wrong speed.
 _POSITIONS = re.compile(r"inc")
 _RATES = re.compile(r"inc/s²?|(0\.\d+ )?rpm(/s)?")
 
 
 def _require_known_units(profile: Profile) -> None:
-    """Raises ValueError where the file states units that this firmware does not have."""
+    """Raise ValueError if the file states units that this firmware does not support."""
     units = profile.units
     for quantity, text, known in (
         ("positions", units.position, _POSITIONS),
@@ -84,7 +85,7 @@ def _require_known_units(profile: Profile) -> None:
 
 
 def _require_whole_bytes(profile: Profile) -> None:
-    """Raises ValueError where process data hold single bits, which this firmware cannot map."""
+    """Raise ValueError if process data contain single bits, which this firmware cannot map."""
     for pdo in profile.pdo.sets if profile.pdo is not None else ():
         if any(part.bits % 8 for part in pdo.layout):
             raise ValueError(
@@ -94,6 +95,6 @@ def _require_whole_bytes(profile: Profile) -> None:
 
 
 def number_device(device: Device, serial: int) -> None:
-    """Give a drive of ours its serial number (1018h:04); one of another factory keeps its own."""
+    """Set the serial number (1018h:04) of a drive made here; other devices keep their own."""
     if isinstance(device, VirtualServo):
         device.od.make_own("1018:04", serial)

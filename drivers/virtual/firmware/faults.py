@@ -1,4 +1,4 @@
-"""Faults of one drive: who reports them, what they set in motion, and what ends them."""
+"""Faults of one drive: their sources, their reactions, and their end."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Emergency = tuple[int, int, bytes]
 
 
 class Tripped(Protocol):
-    """The device control, as far as a fault moves it."""
+    """The part of device control that faults use."""
 
     state: State
 
@@ -28,14 +28,14 @@ class Tripped(Protocol):
         """React to faults: stop, then switch off and enter "fault"."""
 
     def stop_on_warning(self) -> None:
-        """Brake and hold, where a protection only warns and stops."""
+        """Brake and hold, for a protection that only warns and stops."""
 
     def retry_enable(self) -> None:
-        """Enable again by itself after a reset, if the control word still asks for it."""
+        """Enable again by itself after a reset, if the control word still commands it."""
 
 
 class Faults:
-    """Takes protections and entries of the fault table in, and lets them go again."""
+    """Adds faults of protections and of the fault table, and resets them."""
 
     def __init__(self, core: Core, tripped: Tripped, log: FaultLog | None) -> None:
         self._core = core
@@ -59,26 +59,26 @@ class Faults:
 
     # --- coming ----------------------------------------------------------------------------
     def raise_bits(self, bits: int) -> None:
-        """A protection outside the 50 µs loop, or trouble made on purpose."""
+        """Raise the fault of a protection outside the 50 µs loop, or of a test."""
         self._axis.raise_fault(bits)
         self.look()
 
     def raise_entry(self, fault: Fault) -> None:
-        """An entry of the fault table by itself; warnings only show."""
+        """Raise a single entry of the fault table; warnings are only shown."""
         if fault.kind == "warning":
             self.alarms.warn(fault.code)
         else:
             self._take_in([self.alarms.info_of(fault)])
 
     def raise_code(self, code: str) -> bool:
-        """An entry by its code; False where the table has none."""
+        """Raise an entry by its code; return False if the table has none."""
         fault = self.alarms.find(code)
         if fault is not None:
             self.raise_entry(fault)
         return fault is not None
 
     def look(self) -> None:
-        """Take in what the 50 µs loop has found since the last look."""
+        """Add faults that the 50 µs loop has found since the last call."""
         new = self._axis.faults & ~self._reported
         if not new:
             return
@@ -90,7 +90,7 @@ class Faults:
         self._take_in(infos)
 
     def _reports(self, bit: int) -> list[FaultInfo]:
-        """What a protection reports now: its fault, or nothing where it only warns."""
+        """Return the fault that a protection reports; empty if it only warns."""
         if bit == k.F_POSITION_LIMIT and any(self._traits.limits.faults):
             side = int(self._axis.s[k.S_SIGNALS]) & k.SIG_POSITIVE != 0
             fault = self.alarms.find(self._traits.limits.faults[side])
@@ -131,7 +131,7 @@ class Faults:
 
     # --- going -----------------------------------------------------------------------------
     def reacted(self) -> None:
-        """The fault reaction is over; some drives try again by themselves (004:6221-6232)."""
+        """Schedule the automatic retry of some drives after the fault reaction (004:6221-6232)."""
         if self._core.number("200B:07") == 1:
             delay_s = self._core.number("200B:08", 3000) * 1e-3
             self._retry_timer = self._core.schedule.after(delay_s, self._retry)
@@ -142,7 +142,7 @@ class Faults:
             self._tripped.retry_enable()
 
     def reset(self) -> bool:
-        """Leave the fault state if no cause is present and the faults let it (004:5068-5073)."""
+        """Leave the fault state if no cause is present and the faults allow it (004:5068-5073)."""
         if self._tripped.state is not State.FAULT:
             self.alarms.warnings.clear()
             self._reported &= self._axis.live_faults()
@@ -162,7 +162,7 @@ class Faults:
         return True
 
     def _cooling(self) -> bool:
-        """A fault that a reset ends only after a time (000:3882)."""
+        """Return whether an active fault can only be reset after a time (000:3882)."""
         now_s = self._now_s()
         waits = self._traits.reset_after_s
         return any(
@@ -185,7 +185,7 @@ class Faults:
         return bool(self.alarms.warnings) or (math.isfinite(threshold) and hot >= threshold - 20)
 
     def _watch_limits(self) -> None:
-        """Warnings of the limit switches come and go with the switches."""
+        """Set and clear warnings of the limit switches with the switches."""
         if not self._warns_of_limits:
             return
         signals = int(self._axis.s.item(k.S_SIGNALS))

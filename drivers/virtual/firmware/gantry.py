@@ -1,7 +1,7 @@
 """Two virtual drives on one gantry beam: their motors and the beam are stepped together.
 
-Whichever drive is asked first for a time takes both there, so that neither sees the other's motor
-at another time than its own.
+The drive that is advanced first takes both to that time, so that neither reads the other's motor at
+a different time than its own.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class VirtualGantry:
         return done
 
     def _follow(self) -> None:
-        """The beam rests between the motors where they stand, its joints and guides strained."""
+        """Place the beam at rest between the present motor positions; joints may be strained."""
         spec = self.spec
         first, second = self.x[0], self.x[SECOND]
         joints, guides = 0.5 * spec.joint_stiffness_nm_per_rad, spec.yaw_stiffness_nm_per_rad

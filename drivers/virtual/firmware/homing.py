@@ -1,8 +1,9 @@
-"""Homing as scripts: each yields what it waits for and is resumed when that happened.
+"""Homing as scripts: each yields what it waits for and is resumed when that has happened.
 
 Methods 1–14, 17–30, 33, 34, 35 and 37 (CiA 402-2 clause "homing", 004:3837-3893), and the family's
-own against the mechanical limit.
-Directions are shown by ``d``: +1 for the method as printed towards positive positions, −1 for its
+own methods against the mechanical limit.
+
+Directions are given by ``d``: +1 for the method as printed towards positive positions, −1 for its
 mirror image.
 """
 
@@ -29,7 +30,7 @@ class Until:
 
 
 class HomingFailed(Exception):
-    """The search ended where it must not: a limit switch, or a method this drive lacks."""
+    """The search failed: it reached a limit switch, or the drive lacks the method."""
 
 
 Script = Generator[Until, None, float]
@@ -38,7 +39,7 @@ _Step = Generator[Until, None, None]
 
 
 class Homing:
-    """Runs one method at a time. ``attained`` and ``failed`` feed the status word."""
+    """Runs one method at a time. ``attained`` and ``failed`` set bits of the status word."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -57,7 +58,7 @@ class Homing:
         return self._script is not None
 
     def start(self, method: int) -> None:
-        """Begin a method; one that is unknown or cannot work fails at once."""
+        """Start a method; an unknown or impossible one fails at once."""
         self.attained = self.failed = False
         core = self._core
         timeout_key, unit_s = core.family.traits.homing_timeout
@@ -69,13 +70,13 @@ class Homing:
         self._resume()
 
     def abort(self) -> None:
-        """End the search; the axis is left to whoever aborts."""
+        """End the search; the caller takes over the axis."""
         if self._script is not None:
             self._script.close()
         self._finish()
 
     def on_events(self, events: int) -> None:
-        """Resume when what the script waits for has come, or give up at the deadline."""
+        """Resume when the awaited event has occurred."""
         if self._script is None:
             if events & k.EV_STOPPED:
                 self.guard_limits()
@@ -105,13 +106,13 @@ class Homing:
             self._axis.watch_signals(self._waiting.signals)
 
     def guard_limits(self) -> None:
-        """Outside a search a limit switch is a fault again."""
+        """Restore the normal action of limit switches outside a search."""
         self._axis.p[k.P_LIMIT_STOPS] = self._core.limit_mode()
 
     def _fail(self, *, timed_out: bool = False) -> None:
         self.failed = True
         self._finish()
-        # The axis may stand on a limit switch: that is a homing error and no fault.
+        # The axis may be at a limit switch: that is a homing error, not a fault.
         self._axis.p[k.P_LIMIT_STOPS] = 0.0
         self._axis.stop_ramp(self._acceleration())
         self.on_failed(timed_out)
@@ -131,7 +132,7 @@ class Homing:
     # --- building blocks -------------------------------------------------------------------
     def _acceleration(self) -> float:
         raw = self._core.number("609A:00")
-        # Zero is a printed default and cannot move anything: the profile ramp stands in.
+        # Zero is a printed default and would not move the axis: the profile ramp is used instead.
         return self._core.units.ramp(raw or self._core.number("6083:00", 3276800))
 
     def _speed(self, key: str, fallback: int) -> float:
@@ -147,7 +148,7 @@ class Homing:
         self._axis.move(math.copysign(_FAR, direction), speed, ramp, ramp)
 
     def _travel(self, direction: int, signal: int, level: bool, *, slow: bool) -> Script:
-        """Move until a switch has this level; returns the angle there. Limits end it."""
+        """Move until a switch has this level; return the angle there. A limit switch ends it."""
         blocking = (k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE) & ~signal
         self._drive(direction, slow=slow)
         while bool(self._signals() & signal) != level:
@@ -157,7 +158,7 @@ class Homing:
         return self._axis.angle_rad
 
     def _search(self, direction: int, signal: int) -> Generator[Until, None, bool]:
-        """Fast search for a switch; False when the limit switch came first."""
+        """Search fast for a switch; return False if the limit switch came first."""
         limit = k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE
         self._drive(direction, slow=False)
         while not self._signals() & signal:
@@ -167,7 +168,7 @@ class Homing:
         return True
 
     def _index(self, direction: int) -> Script:
-        """Slow search for the next index pulse; returns its angle."""
+        """Search slowly for the next index pulse; return its angle."""
         self._drive(direction, slow=True)
         limit = k.SIG_POSITIVE if direction > 0 else k.SIG_NEGATIVE
         before = float(self._axis.s[k.S_INDEX_COUNT])
@@ -178,9 +179,10 @@ class Homing:
         return float(self._axis.s[k.S_INDEX_ANGLE])
 
     def _index_either_way(self, direction: int) -> Script:
-        """Methods 33 and 34. Some families take an index on which they stand (000:2677), turn
-        round at the limit switch, pass the index and approach it again in the method's own
-        direction (000:2679).
+        """Search the index for methods 33 and 34.
+
+        Some families accept an index at the present position (000:2677), reverse at the limit
+        switch, pass the index and approach it again in the method's own direction (000:2679).
         """
         turn = float(self._axis.p[k.P_INDEX_RAD])
         nearest = round(self._axis.angle_rad / turn) * turn
@@ -237,9 +239,9 @@ class Homing:
             self._axis.hold()
 
     def _take(self, home: float) -> None:
-        """The zero position lies the home offset beyond the home position (004:7231-7236).
+        """Set the zero position the home offset beyond the home position (004:7231-7236).
 
-        Some families show the offset as the position at home instead (001:687-691, 002:4344).
+        Some families use the offset as the position at home instead (001:687-691, 002:4344).
         """
         core = self._core
         offset = core.number("607C:00") / core.units.position_per_rad
@@ -252,7 +254,10 @@ class Homing:
             core.zero_rad = home - offset
 
     def _offset_way(self) -> str:
-        """P12.11 of the M6-L: 0 at home, 1 shifts, 2 and 3 travel the offset (000:2213-2222)."""
+        """Return P12.11 of the M6-L (000:2213-2222).
+
+        0: zero at home, 1: shift the position, 2 and 3: travel the offset.
+        """
         traits = self._core.family.traits
         if traits.home_offset != "by_parameter":
             return traits.home_offset
@@ -260,7 +265,7 @@ class Homing:
         return {0: "at_home", 1: "shift", 2: "travel_to_zero", 3: "travel"}.get(chosen, "at_home")
 
     def _travel_offset(self, home: float) -> Generator[Until, None, None]:
-        """Go the offset beyond home; there the position is 0, or the offset."""
+        """Travel the offset beyond home; the position there is 0, or the offset."""
         core = self._core
         offset = core.number("607C:00") / core.units.position_per_rad
         ramp = self._acceleration()
@@ -285,7 +290,7 @@ class Homing:
         return self._axis.angle_rad
 
     def _edge(self, method: int, *, by_edge: bool) -> Generator[Until, None, int]:
-        """Find the switch edge of methods 1 to 14; returns the direction to the index pulse."""
+        """Find the switch edge of methods 1 to 14; return the direction to the index pulse."""
         if method in (1, 2):
             d = 1 if method == 2 else -1
             limit = k.SIG_POSITIVE if d > 0 else k.SIG_NEGATIVE
@@ -310,7 +315,7 @@ class Homing:
             if not active:
                 found = yield from self._search(d, home)
                 if not found:
-                    # Started behind a cam: back over it, and to its edge again (000:2285).
+                    # Started beyond a cam: back across it, and to its edge again (000:2285).
                     if not self._core.family.traits.home_side_reverses:
                         raise HomingFailed
                     yield from self._travel(-d, home, True, slow=False)
@@ -327,7 +332,7 @@ class Homing:
     def _cam(self, d: int, which: int) -> Generator[Until, None, int]:
         """Methods 7 to 14: a home cam and a limit switch in direction ``d``.
 
-        ``which``: 0 before the near edge, 1 behind it, 2 before the far edge, 3 behind it.
+        ``which``: 0 before the near edge, 1 after it, 2 before the far edge, 3 after it.
         """
         home = k.SIG_HOME
         near = which in (0, 1)
@@ -335,7 +340,7 @@ class Homing:
             found = yield from self._search(d, home)
             if not found:
                 yield from self._travel(-d, home, True, slow=False)
-        # Inside the cam now: leave it over the wanted edge.
+        # Inside the cam now: leave it across the wanted edge.
         outwards = -d if near else d
         final = which in (0, 3)
         yield from self._travel(outwards, home, False, slow=final)

@@ -1,9 +1,9 @@
 """The drive's own parameter identification (200Ch, control word bit 11, 004:2650-2819).
 
-The inertia is measured, not known: the axis is run up and braked by two constant torques and
-the regression of torque on acceleration and speed gives inertia and friction, so a load that
-cannot be moved fails as it would in a drive. Electrical values are what the simulated windings
-have, to the resolution of their objects.
+The inertia is measured, not taken from the model: the axis is accelerated and braked by two
+constant torques, and the regression of torque on acceleration and speed gives inertia and friction,
+so that a load that cannot be moved fails as it would in a drive. Electrical values are those of the
+simulated windings, to the resolution of their objects.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _Wait = Generator[float, None, None]
 
 
 class Identification:
-    """Walks through the states of 200Ch:05 and fills 200Ch:06 to :0C."""
+    """Steps through the states of 200Ch:05 and sets 200Ch:06 to :0C."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -43,14 +43,14 @@ class Identification:
         return self._script is not None
 
     def start(self, ended: Callable[[], None]) -> None:
-        """Begin; ends by itself in "complete" or "error" and shows so."""
+        """Start; it ends by itself in the state "complete" or "error"."""
         self.started = True
         self._ended = ended
         self._script = self._run()
         self._resume()
 
     def stop(self) -> None:
-        """Control word bit 11 fell, or something else took the axis."""
+        """Stop, as control word bit 11 fell or the axis got another command."""
         if self._script is not None:
             self._script.close()
             self._script = None
@@ -113,10 +113,10 @@ class Identification:
     def _swing(
         self, share: float, rounds: float, samples: list[tuple[float, float, float]]
     ) -> _Wait:
-        """Accelerate until speed or travel is used up, then brake; collects (T, a, ω)."""
+        """Accelerate until speed or travel is used up, then brake; collect (T, a, ω)."""
         axis, motor = self._axis, self._core.motor
         start = axis.angle_rad
-        travel = rounds * math.pi  # half of the permitted turns to speed up, half to brake
+        travel = rounds * math.pi  # half of the permitted turns to accelerate, half to brake
         for torque in (share, -share):
             axis.run_torque(torque * motor.rated_torque_nm, math.inf)
             yield 0.005  # the torque has settled
@@ -162,7 +162,7 @@ class Identification:
 
 
 def regress(samples: list[tuple[float, float, float]]) -> tuple[float, float, float] | None:
-    """Least squares of T = J·a + b·ω + Tc·sign(ω) + Tg; None when the data do not carry it."""
+    """Fit T = J·a + b·ω + Tc·sign(ω) + Tg by least squares; None for insufficient data."""
     if len(samples) < 20:
         return None
     data = np.array(samples)

@@ -1,16 +1,17 @@
-"""What a drive moves by itself, without the bus: its jog by inputs or a parameter, and homing.
+"""Motions that a drive makes by itself, without the bus: jog by inputs or a parameter, and homing.
 
 M6-L: inputs with functions 17 and 18 at the speed of P06.05 (000:1191-1193); the ramps P06.07 and
 P06.08 are assumed up to 1000 rpm, which is not printed. R6L: inputs with functions 39 and 40 at
 P04.04, with the servo off, and P04.05 and P04.06 as the times to and from 1000 rpm (002:9774-9807).
-Both inputs at once, or none, stand still. Whoever enables the axis over the bus ends it; an input
-that is still on when the axis is free again begins again.
+Both inputs at once, or neither, mean standstill. Enabling the axis over the bus ends the jog; an
+input that is still on when the axis is free again restarts it.
 
 R6L: P12.10 "JOG running" (002:11909) is printed without values: 1 forward, 2 backward and 0 for the
 end are assumed. M6-L: P12.00 = 4 or 5 homes at once (000:3618) at the speed P12.05 with the time
-P12.08, until the home or limit switch comes, P12.09 is over, or 0 is written; odd methods of P12.01
-go backward. Only the search for the first switch is simulated. That both move the axis as the
-inputs do, without having been enabled over the bus, is the worst case of what is left open.
+P12.08, until the home or limit switch is reached, P12.09 is over, or 0 is written; odd methods of
+P12.01 go backward. Only the search for the first switch is simulated. It is not printed whether
+both move the axis without enabling over the bus, as the inputs do; this is assumed as the worst
+case.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _LOOK_S = 2e-3
 
 
 class TerminalJog:
-    """Turns the axis while one of its two inputs is on; ``free`` says that the bus does not."""
+    """Moves the axis while one of its two inputs is on; ``free``: the bus does not command it."""
 
     def __init__(self, core: Core, brake: HoldingBrake, free: Callable[[], bool]) -> None:
         self._core = core
@@ -44,21 +45,21 @@ class TerminalJog:
 
     @property
     def active(self) -> bool:
-        """Turning, or still stopping."""
+        """Moving, or still stopping."""
         return self._wanted != 0 or self._stopping
 
     def update(self, *, forward: bool, backward: bool) -> None:
-        """Levels of the two inputs, whenever they may have changed."""
+        """Apply the levels of the two inputs, whenever they may have changed."""
         self._inputs = int(forward) - int(backward)
         self._decide()
 
     def order(self, direction: int) -> None:
-        """The parameter that jogs was written: 1 forward, -1 backward, 0 ends it."""
+        """Handle a write of the jog parameter: 1 forward, -1 backward, 0 ends it."""
         self._ordered = direction
         self._decide()
 
     def home(self, keys: OwnHomingKeys, *, begin: bool) -> None:
-        """The parameter that homes was written."""
+        """Handle a write of the homing parameter."""
         self._end_homing()
         if begin and self._free() and not self._wanted:
             self._homing = keys
@@ -70,7 +71,7 @@ class TerminalJog:
         self._decide()
 
     def _look(self, left_s: float) -> None:
-        """The search ends at a switch, or when its time is over."""
+        """End the search at a switch, or when its time is over."""
         self._timer = None
         pressed = int(self._axis.s[k.S_SIGNALS]) & (k.SIG_HOME | self._limit_ahead())
         if left_s <= 0.0 or pressed:
@@ -100,13 +101,13 @@ class TerminalJog:
             self._turn()
 
     def cancel(self) -> None:
-        """Something else takes the axis."""
+        """Cancel, as the axis gets another command."""
         self._end_homing()
         self._homing = None
         self._wanted, self._stopping, self._ordered = 0, False, 0
 
     def stopped(self) -> None:
-        """The axis has stopped."""
+        """Handle the standstill of the axis."""
         if not self._stopping:
             return
         self._stopping = False
@@ -127,7 +128,7 @@ class TerminalJog:
         self._axis.stop_ramp(self._settings()[2])
 
     def _settings(self) -> tuple[float, float, float]:
-        """Speed [rad/s] and both ramps [rad/s²]."""
+        """Return speed [rad/s] and both ramps [rad/s²]."""
         keys, homing = self._core.family.traits.jog, self._homing
         if keys is None:
             return (0.0, 1.0, 1.0)

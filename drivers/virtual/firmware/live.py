@@ -34,7 +34,7 @@ _STANDARD_OF_ROLE = {
 def live_values(
     core: Core, control: DeviceControl, panel: Panel | Terminals
 ) -> dict[str, Callable[[], Number]]:
-    """Getters by parameter key; a drive connects those that its dictionary has."""
+    """Return getters by parameter key; a drive connects those in its dictionary."""
     item = core.axis.s.item
     inc_per_rad = _TURN_INCREMENTS / (2 * 3.141592653589793)
 
@@ -57,7 +57,7 @@ def live_values(
         return panel.digital_inputs()
 
     def plain_inputs() -> int:
-        """CiA 402 bits 0 to 2 as the loop sees the switches."""
+        """Return CiA 402 bits 0 to 2 by the switches as the loop receives them."""
         bits = int(item(k.S_SIGNALS)) & 7
         if core.family.traits.limit_bits_swapped:
             bits = bits & 4 | (bits & 1) << 1 | bits >> 1 & 1
@@ -99,7 +99,7 @@ def live_values(
         values[LOAD_POSITION] = LoadEncoder(core.axis, core.axis.spec.load_encoder)
     values |= core.family.readings(core.axis)
     values |= monitors(core, control, panel if isinstance(panel, Terminals) else None)
-    # The same quantity under a number of the maker's own (2102h is DS_C's error code).
+    # The same quantity under a number of the manufacturer's own (2102h is DS_C's error code).
     for role, standard in _STANDARD_OF_ROLE.items():
         parameter = core.profile.by_role.get(role)
         if parameter is not None and parameter.access == "ro":

@@ -20,7 +20,7 @@ _KEPT = 64
 
 
 def without_load_encoder(profile: Profile, encoder: LoadEncoderSpec | None) -> Profile:
-    """The profile of a drive to which no second encoder is connected: 60E4h is not there."""
+    """Return the profile without 60E4h, for a drive without a second encoder."""
     if encoder is not None:
         return profile
     kept = tuple(p for p in profile.parameters if p.index != 0x60E4)
@@ -32,7 +32,7 @@ def without_load_encoder(profile: Profile, encoder: LoadEncoderSpec | None) -> P
 
 
 class LoadEncoder:
-    """Counts of the last inertia: its error over a revolution, noise, and steps."""
+    """Counts of the last inertia, with error over a revolution, noise and quantisation."""
 
     def __init__(self, axis: VirtualAxis, spec: LoadEncoderSpec) -> None:
         self._axis, self._spec = axis, spec
@@ -42,7 +42,7 @@ class LoadEncoder:
         self._counts = 0
 
     def __call__(self) -> int:
-        """60E4h now; the same within one step of 50 µs."""
+        """Return the present 60E4h; constant within one step of 50 µs."""
         step = self._axis.s.item(k.S_STEP)
         if step == self._step:
             return self._counts

@@ -1,9 +1,9 @@
-"""The load inertia that a drive measures by itself: by swings of its own, or while it works.
+"""Identification of the load inertia by the drive: with its own motion, or during operation.
 
 Offline: P09.00 to P09.04 of the M6-L (000:3417-3421), P07.05 to P07.09 with 200Ch:0Ch of the R6L
 (002:11121-11161, 002:11919). Online: P09.05 of the M6-L (000:3422). The inertia is measured, not
-known: the regression of torque on acceleration, speed and the direction of motion gives it. What
-value starts it is not printed in either manual; any but 0 does here, and 0 stops it.
+taken from the model: by regression of torque on acceleration, speed and the direction of motion.
+The start value is not printed in either manual; any value but 0 starts it here, and 0 stops it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Sample = tuple[float, float, float]
 
 
 class LoadIdentification:
-    """Runs one identification at a time; ``active`` while the axis swings."""
+    """Runs one identification at a time; ``active`` while the axis moves for it."""
 
     def __init__(self, core: Core, keys: LoadKeys, failed: Callable[[], None]) -> None:
         self._core = core
@@ -40,11 +40,11 @@ class LoadIdentification:
 
     @property
     def active(self) -> bool:
-        """True while swinging."""
+        """True while moving."""
         return self._script is not None
 
     def start(self) -> None:
-        """Begin swinging; the axis must be free to turn by what the drive reports."""
+        """Start the motion; the axis must be free to turn by the displayed revolutions."""
         if self.active:
             return
         self._samples = []
@@ -76,7 +76,7 @@ class LoadIdentification:
         return float(self._core.profile.by_key[key].to_value(self._core.number(key)))
 
     def _show_revolutions(self) -> None:
-        """How far each swing goes, up and down the ramp: P09.03, P07.09."""
+        """Set the travel of each move, up and down the ramp: P09.03, P07.09."""
         key = self._keys.revolutions
         if key is None or key not in self._core.profile.by_key:
             return
@@ -129,7 +129,7 @@ class LoadIdentification:
         return None if fit is None else fit[0]
 
     def _take(self, inertia: float, share: float) -> None:
-        """Move the ratio by this share of the way."""
+        """Change the ratio by this share of the difference."""
         parameter = self._core.profile.by_key[self._keys.ratio]
         rotor = self._core.motor.rotor_inertia_kgm2
         measured = max(0.0, inertia / rotor - 1.0) * self._keys.ratio_per_one
@@ -140,7 +140,7 @@ class LoadIdentification:
         self._core.apply_settings()
 
     def _watch(self) -> None:
-        """Online: look at the motion that others command, and adapt every half second of it."""
+        """Online: evaluate motion commanded by others, and adapt after every half second of it."""
         mode = int(self._core.number(self._keys.online or ""))
         share = {1: 0.05, 2: 0.2, 3: 0.5}.get(mode, 0.0)
         if share and self._axis.powered and not self.active:

@@ -1,6 +1,6 @@
-"""Settings in SI units as the parameters of the 50 µs loop.
+"""Conversion of settings in SI units to the parameters of the 50 µs loop.
 
-Each function writes its part of ``p`` (`drivers.virtual.firmware.kernel.layout`) and no more.
+Each function writes only its own part of ``p`` (`drivers.virtual.firmware.kernel.layout`).
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ Parameters = npt.NDArray[np.float64]
 
 
 def low_pass(cutoff_hz: float) -> float:
-    """Coefficient of an exactly sampled first-order low pass; 1 passes everything."""
+    """Return the coefficient of an exactly sampled first-order low-pass; 1 means no filter."""
     return 1.0 if math.isinf(cutoff_hz) else 1.0 - math.exp(-TURN * cutoff_hz * k.STEP_S)
 
 
 def write_physics(p: Parameters, spec: MechanicsSpec, motor: MotorData) -> None:
-    """Encoder, friction, travel, switches, motor and supply of this axis."""
+    """Write encoder, friction, travel, switches, motor and supply of this axis."""
     p[k.P_COUNTS_PER_RAD] = spec.encoder.counts_per_rev / TURN
     p[k.P_NOISE] = spec.encoder.noise_counts
     encoder, phases = spec.encoder, spec.phases
@@ -83,14 +83,14 @@ def write_physics(p: Parameters, spec: MechanicsSpec, motor: MotorData) -> None:
 
 
 def write_gains(p: Parameters, first: GainSet, second: GainSet) -> None:
-    """The two gain sets between which the loop switches."""
+    """Write the two gain sets between which the loop switches."""
     p[k.P_KP_POSITION_1], p[k.P_KP_POSITION_2] = first.position_per_s, second.position_per_s
     p[k.P_KP_SPEED_1], p[k.P_KP_SPEED_2] = first.speed_nms, second.speed_nms
     p[k.P_KI_SPEED_1], p[k.P_KI_SPEED_2] = first.integral_nm, second.integral_nm
 
 
 def write_loops(p: Parameters, loops: LoopSettings) -> None:
-    """Gain switching, limits, feed-forward, filters and notches; not the gains themselves."""
+    """Write gain switching, limits, feed-forward, filters and notches; not the gains themselves."""
     switching = loops.switching
     p[k.P_SWITCH_KIND], p[k.P_SWITCH_LEVEL] = switching.kind, switching.level
     p[k.P_SWITCH_HYSTERESIS] = switching.hysteresis
@@ -125,7 +125,7 @@ def write_loops(p: Parameters, loops: LoopSettings) -> None:
 
 
 def _write_extras(p: Parameters, loops: LoopSettings) -> None:
-    """Third gains, command notch and quadrant compensation of the families that have them."""
+    """Write third gains, command notch and quadrant compensation of families that have them."""
     third, swing = loops.third, loops.swing
     p[k.P_THIRD_GAINS] = third is not None
     if third is not None:
@@ -147,7 +147,7 @@ def _write_extras(p: Parameters, loops: LoopSettings) -> None:
 def write_protections(
     p: Parameters, limits: ProtectionSettings, rated_nm: float, resistor: bool
 ) -> None:
-    """Thresholds of the protections; ``resistor`` shows whether one is fitted to brake with."""
+    """Write thresholds of the protections; ``resistor``: a braking resistor is fitted."""
     p[k.P_OCP_A], p[k.P_UVLO_V] = limits.over_current_a, limits.under_voltage_v
     p[k.P_OVP_V], p[k.P_BRAKE_ON_V] = limits.over_voltage_v, limits.brake_on_v
     fitted = limits.brake_enabled and resistor
@@ -163,7 +163,7 @@ def write_protections(
 
 
 def write_impedance(p: Parameters, settings: ImpedanceSettings) -> None:
-    """Gains of the impedance controller."""
+    """Write gains of the impedance controller."""
     p[k.P_Z_KP], p[k.P_Z_KI], p[k.P_Z_KD] = settings.kp, settings.ki, settings.kd
     p[k.P_Z_FILTER], p[k.P_Z_LIMIT] = low_pass(settings.filter_hz), settings.limit_nm
 
@@ -173,7 +173,7 @@ def _lag(time_constant_s: float) -> float:
 
 
 def _swing_coefficients(swing: SwingFilter) -> list[float]:
-    """The kernel's A11, A12, A21, A22, B1, B2: the notch's low pass, sampled exactly."""
+    """Return the kernel's A11, A12, A21, A22, B1, B2: the notch's low-pass, sampled exactly."""
     w, two_zeta_w = TURN * swing.frequency_hz, 2 * swing.damping * TURN * swing.frequency_hz
     block = np.array([[0.0, 1.0, 0.0], [-w * w, -two_zeta_w, two_zeta_w], [0.0, 0.0, 0.0]])
     solved = expm(block * k.STEP_S)

@@ -20,7 +20,7 @@ Check = Callable[[Raw], None]
 class MappingRules:
     """Checks for writes to 1600h–17FFh, 1A00h–1BFFh, 1C12h and 1C13h.
 
-    That these objects change only in Pre-Operational is the wire's duty.
+    The wire ensures that these objects change only in Pre-Operational.
     """
 
     def __init__(self, od: ObjectDictionary, profile: Profile) -> None:
@@ -29,7 +29,7 @@ class MappingRules:
         self._max_bytes = profile.pdo.max_bytes if profile.pdo else None
 
     def check_for(self, entry: Entry) -> Check | None:
-        """The check of this entry, or None if it is no mapping object."""
+        """Return the check of this entry, or None if it is not a mapping object."""
         index = entry.parameter.index or 0
         if index in (0x1C12, 0x1C13):
             return self._assignment(index, entry.parameter.subindex or 0)
@@ -41,7 +41,7 @@ class MappingRules:
         return None
 
     def _counted(self, index: int) -> int:
-        """The count in use: what stood there before the write that is being checked."""
+        """Return the count in use, before the write that is being checked."""
         entry = self._od.entries.get(index << 8)
         return int(entry.value) if entry is not None else 0
 

@@ -1,4 +1,4 @@
-"""What each mode of operation does with its setpoints (004:3641-4530)."""
+"""Use of the setpoints in each mode of operation (004:3641-4530)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class _Move(NamedTuple):
 
 
 class Modes:
-    """Starts modes and feeds them; knows setpoints, not states."""
+    """Starts modes and supplies their setpoints; independent of the power states."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -54,7 +54,7 @@ class Modes:
 
     # --- starting and ending ---------------------------------------------------------------
     def start(self, mode: int) -> None:
-        """Begin a mode with the power stage on, without a bump."""
+        """Start a mode with the power stage on, without a bump."""
         if self.homing.active:
             self.homing.abort()
         self.homing.guard_limits()
@@ -73,14 +73,14 @@ class Modes:
             self._axis.hold()
 
     def end(self) -> None:
-        """The power stage goes off or something else takes over the axis."""
+        """End the mode, as the power stage goes off or something else takes over the axis."""
         if self.homing.active:
             self.homing.abort()
         self.running = False
         self._waiting = None
 
     def resume(self) -> None:
-        """After a halt: go on with what was commanded (004:2633-2635)."""
+        """Continue the commanded motion after a halt (004:2633-2635)."""
         self.running = True
         if self.mode == PP:
             if self._move is not None:
@@ -92,7 +92,7 @@ class Modes:
 
     # --- setpoints ------------------------------------------------------------------------
     def refresh(self) -> None:
-        """A setpoint or parameter of the running mode changed."""
+        """Apply a changed setpoint or parameter of the running mode."""
         if not self.running:
             return
         core = self._core
@@ -110,7 +110,7 @@ class Modes:
             self._interpolation()
 
     def on_control_word(self, now: int, before: int) -> None:
-        """Bits 4 to 6 in PP, bit 4 in HM; only called in operation enabled."""
+        """Handle bits 4 to 6 in PP, bit 4 in HM; only called in operation enabled."""
         rising = now & ~before
         if self.mode == PP:
             if rising & _NEW_SET_POINT and self.running:
@@ -152,7 +152,7 @@ class Modes:
         self._axis.move(*move)
 
     def on_events(self, events: int, control_word: int) -> None:
-        """Trajectory ends and homing progress."""
+        """Handle the end of trajectories and homing progress."""
         if self.mode == HM:
             self.homing.on_events(events)
         elif events & k.EV_ARRIVED and self.mode == PP and self._waiting is not None:
@@ -179,9 +179,9 @@ class Modes:
             )
 
     def on_cycle(self) -> None:
-        """One cycle of process data arrived.
+        """Handle the arrival of process data of one cycle.
 
-        Where the cycles come on an exact grid that is finer than 60C2h can say (it has steps of
+        If the cycles come on an exact grid that is finer than 60C2h can express (it has steps of
         100 µs at best, 004:7628), the drive interpolates over the grid's period.
         """
         now = int(self._item(k.S_STEP))
@@ -190,7 +190,7 @@ class Modes:
         self.on_cyclic(spacing if steady and 0 < spacing < self._steps else None)
 
     def on_cyclic(self, steps: int | None = None) -> None:
-        """New cyclic setpoints: interpolate to them over ``steps``, by default 60C2h."""
+        """Interpolate to new cyclic setpoints over ``steps``, by default 60C2h."""
         if not self.running or self.mode not in _CYCLIC_LOOP:
             return
         core, units = self._core, self._core.units
@@ -214,14 +214,14 @@ class Modes:
 
     # --- for the status word ---------------------------------------------------------------
     def slow_ramp(self) -> float:
-        """Deceleration of the present mode's slow-down ramp (004:2463-2467)."""
+        """Return the deceleration of the present mode's slow-down ramp (004:2463-2467)."""
         core = self._core
         if self.mode == HM and core.number("609A:00"):
             return core.units.ramp(core.number("609A:00"))
         return core.deceleration("6084:00")
 
     def status_bits(self, halted: bool, enabled: bool) -> int:
-        """Bits 10 to 13 of the status word."""
+        """Return bits 10 to 13 of the status word."""
         item, mode = self._item, self.mode
         limited = self.limited or item(k.S_LIMIT_ACTIVE) > 0 or item(k.S_LIMIT_HELD) > 0
         bits = 1 << 11 if limited else 0
@@ -238,7 +238,7 @@ class Modes:
         return bits
 
     def reached(self, halted: bool) -> bool:
-        """Bit 10 of the status word with the power stage on: target reached, or at standstill."""
+        """Return bit 10 of the status word with power on: target reached, or standstill."""
         item, mode = self._item, self.mode
         if halted:
             return item(k.S_ZERO_T) > 0

@@ -1,6 +1,6 @@
-"""Monitor parameters and fault records of the makers' own, with manual lines.
+"""The manufacturers' own monitor parameters and fault records, with manual lines.
 
-Values are given in engineering units of the parameter and brought to raw by its scale.
+Values are in engineering units of the parameter and converted to raw by its scale.
 """
 
 from __future__ import annotations
@@ -22,45 +22,45 @@ Getter = Callable[[], Number]
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """What monitors are made of."""
+    """Sources of monitor values."""
 
     core: Core
     control: DeviceControl
     terminals: Terminals | None
 
     def item(self, state: int) -> float:
-        """A state of the 50 µs loop."""
+        """Return a state of the 50 µs loop."""
         return float(self.core.axis.s.item(state))
 
     def rpm(self, state: int) -> Value:
-        """A speed in rpm."""
+        """Return a speed in rpm."""
         return lambda: self.item(state) * _RPM
 
     def percent(self, state: int) -> Value:
-        """A torque in % of the rated torque."""
+        """Return a torque in % of the rated torque."""
         return lambda: 100 * self.item(state) / self.core.motor.rated_torque_nm
 
     def counts(self, state: int) -> Value:
-        """An angle in encoder increments."""
+        """Return an angle in encoder increments."""
         per_rad = float(self.core.axis.p[k.P_COUNTS_PER_RAD])
         return lambda: self.item(state) * per_rad
 
     def position(self, state: int) -> Value:
-        """An angle in command units."""
+        """Return an angle in command units."""
         return lambda: self.core.position_of(self.item(state))
 
     def deviation(self) -> float:
-        """Position deviation in command units."""
+        """Return the position deviation in command units."""
         away = self.item(k.S_P_DEMAND) - self.item(k.S_THETA)
         return away * self.core.units.position_per_rad
 
     def turn_share(self) -> float:
-        """Place within the revolution, 0 to 1."""
+        """Return the position within the revolution, 0 to 1."""
         return self.item(k.S_THETA) / (2 * math.pi) % 1.0
 
 
 def monitors(core: Core, control: DeviceControl, terminals: Terminals | None) -> dict[str, Getter]:
-    """Raw getters of the parameters that this drive's dictionary has."""
+    """Return raw getters of the parameters in this drive's dictionary."""
     values = core.family.monitors(Sources(core, control, terminals))
     if terminals is not None:
         table = core.family.terminals

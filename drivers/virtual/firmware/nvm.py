@@ -26,19 +26,19 @@ class Nvm:
             stored = json.loads(path.read_text("utf-8"))
             return {str(key): value for key, value in stored["values"].items()}
         except (OSError, ValueError, KeyError, AttributeError, TypeError):
-            # A drive with a broken memory starts with defaults and reports it (004:4825-4832).
+            # A drive with a damaged memory starts with defaults and reports it (004:4825-4832).
             self.damaged = True
             return {}
 
     def load(self) -> dict[str, Raw]:
-        """What was saved last."""
+        """Return the values saved last."""
         return dict(self._memory)
 
     def save(self, values: Mapping[str, Raw]) -> None:
         """Replace the contents; a crash leaves either the old or the new file.
 
         Raises:
-            OSError: the file cannot be written; the old contents stay.
+            OSError: the file cannot be written; the old contents are kept.
         """
         if self._path is not None:
             self._path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ _SIGNALS: dict[Number, int] = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HO
 
 
 class Panel:
-    """Levels of the terminals. ``external`` holds levels set from outside the mechanics."""
+    """Levels of the terminals. ``external`` contains levels set from outside the mechanics."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -35,13 +35,13 @@ class Panel:
         return int(self._functions[terminal].active)
 
     def terminal_valid(self, terminal: int, *, simulated: bool) -> bool:
-        """Logic of an input: after polarity and, if asked, after simulation (2031h)."""
+        """Return the logic level of an input: after polarity and optionally simulation (2031h)."""
         if simulated and int(self._simulated.active) >> terminal & 1:
             return bool(int(self._simulation.active) >> terminal & 1)
         return self._levels()[terminal]
 
     def _levels(self) -> list[bool]:
-        """Logic of all inputs after polarity."""
+        """Return the logic levels of all inputs after polarity."""
         physical, polarity = self._physical(), int(self._polarity.active)
         levels = list(self.external)
         for terminal in range(_INPUTS):
@@ -51,7 +51,7 @@ class Panel:
         return levels
 
     def _physical(self) -> int:
-        """Switches as the mechanics presses them."""
+        """Return the switches activated by the mechanics."""
         axis = self._core.axis
         angle, limit = axis.s.item(k.S_THETA), axis.p.item
         pressed = k.SIG_NEGATIVE if angle <= limit(k.P_LIMIT_NEGATIVE) else 0
@@ -60,9 +60,9 @@ class Panel:
         return pressed | (k.SIG_HOME if inside else 0)
 
     def digital_inputs(self) -> int:
-        """60FDh: functions in bits 0–2, inputs in 16–19, outputs in 24/25 (004:7700-7728).
+        """Return 60FDh: functions in bits 0–2, inputs 16–19, outputs 24/25 (004:7700-7728).
 
-        Simulation does not show here (004:2014-2015).
+        Simulation is not shown here (004:2014-2015).
         """
         word = 0
         for terminal, level in enumerate(self._levels()):
@@ -74,7 +74,7 @@ class Panel:
         return word | self.outputs() << 24
 
     def outputs(self) -> int:
-        """Logic of DO1 and DO2: forced (60FEh), simulated (2031h) or by function (2030h)."""
+        """Return DO1 and DO2: forced (60FEh), simulated (2031h) or by function (2030h)."""
         forced, mask = int(self._forced.active), int(self._mask.active)
         simulated, values = int(self._simulated.active), int(self._simulation.active)
         word = 0
@@ -89,7 +89,7 @@ class Panel:
         return word
 
     def update(self) -> bool:
-        """Something at the terminals may have changed; True asks for a fault reset (DI3)."""
+        """Update after a possible change at the terminals; True requests a fault reset (DI3)."""
         self._update_probes()
         before, self._resetting = self._resetting, self._alarm_reset_input()
         return self._resetting and not before
@@ -99,7 +99,7 @@ class Panel:
 
     # --- touch probe -----------------------------------------------------------------------
     def set_probe_function(self, word: int) -> None:
-        """60B8h: enabling again forgets what was latched."""
+        """Apply 60B8h: enabling again clears the latched state."""
         rising = word & ~self._probe_function
         for probe, shift in ((0, 0), (1, 8)):
             if rising >> shift & 1 or not word >> shift & 1:
@@ -129,9 +129,9 @@ class Panel:
                 self._probe_status |= done
 
     def probe_status(self) -> int:
-        """60B9h."""
+        """Return 60B9h."""
         return self._probe_status | (self._probe_function & 0x0101)
 
     def latched(self, key: str) -> int:
-        """60BAh to 60BDh."""
+        """Return one of 60BAh to 60BDh."""
         return self._latched[key]

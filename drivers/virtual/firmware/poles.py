@@ -2,10 +2,11 @@
 
 M6-L (000:1163-1181, P01.20, P24.00 to P24.10): a direct drive motor with an incremental or sin/cos
 encoder and without a Hall sensor needs it once after every power-on. In the manual mode (P24.01 =
-0) enabling without it is Er.059; P24.01 = 2 identifies with the first enabling. Pre-positioning
-pulls the rotor to the nearest pole by a constant current; micro-motion nudges it by P24.09. Either
-fails with Er.058 where the rotor does not follow; so does the reserved method 0.
-How long the parts take is not printed.
+0) enabling without it raises Er.059; P24.01 = 2 identifies at the first enabling. Pre-positioning
+pulls the rotor to the nearest pole by a constant current; micro-motion moves it by P24.09. Either
+fails with Er.058 if the rotor does not follow; so does the reserved method 0.
+
+The durations of the parts are not printed.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class PoleKeys:
 
 
 class PoleIdentification:
-    """What a power-on has learnt of the rotor's angle, and how it learns it."""
+    """Knowledge of the rotor's angle since power-on, and its identification."""
 
     def __init__(self, core: Core, report: Callable[[str], None], free: Callable[[], bool]) -> None:
         self._core = core
@@ -62,7 +63,7 @@ class PoleIdentification:
 
     @property
     def needed(self) -> bool:
-        """Whether the axis cannot be enabled as it is."""
+        """Whether the axis cannot be enabled without identification."""
         keys, number = self._keys, self._core.number
         return (
             self._applies
@@ -74,12 +75,12 @@ class PoleIdentification:
 
     @property
     def refusal(self) -> str | None:
-        """Fault with which enabling is answered, None where it may go on."""
+        """Fault with which enabling is refused, None if it is permitted."""
         by_itself = int(self._core.number(self._keys.mode)) == WHEN_ENABLED
         return _MISSING if self.needed and not by_itself else None
 
     def start(self, then: Callable[[], None] | None = None) -> bool:
-        """Begin; ``then`` is called when the angle is known. False where the axis is not free."""
+        """Start; call ``then`` when the angle is known. Return False if the axis is busy."""
         if self.active or (then is None and not self._free()):
             return False
         self._then = then
@@ -88,7 +89,7 @@ class PoleIdentification:
         return True
 
     def cancel(self) -> None:
-        """Something else takes the axis."""
+        """Cancel, as the axis gets another command."""
         if self._script is not None:
             self._script.close()
             self._script = None
@@ -134,14 +135,14 @@ class PoleIdentification:
         return False
 
     def _go(self, target_rad: float) -> Generator[float, None, bool]:
-        """Pull the rotor to an angle; whether it came."""
+        """Pull the rotor to an angle; return whether it followed."""
         self._axis.move(target_rad, _CREEP_RAD_S, _RAMP_RAD_S2, _RAMP_RAD_S2)
         way = abs(target_rad - self._axis.angle_rad)
         yield way / _CREEP_RAD_S + _SETTLE_S
         return abs(self._axis.angle_rad - target_rad) < 0.1 * way + 1e-3
 
     def _nudge_rad(self) -> float:
-        """P24.09 in mm of a linear motor, in turns of its pole pitch P01.29."""
+        """Return P24.09 in mm of a linear motor, in turns of its pole pitch P01.29."""
         keys, by_key = self._keys, self._core.profile.by_key
         nudge, pitch = (
             float(by_key[key].to_value(self._core.number(key)))

@@ -1,4 +1,4 @@
-"""Process data: checking a mapping and moving values in and out of the dictionary."""
+"""Process data: check of a mapping, and transfer of values to and from the dictionary."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FORMAT = {
 def check_mapping(
     od: ObjectDictionary, entries: Sequence[int], direction: str, max_bytes: int | None
 ) -> list[Entry | int]:
-    """Entries of a mapping, or the number of bytes of a gap (index 0).
+    """Return entries of a mapping, or the number of bytes of a gap (index 0).
 
     Raises SdoAbort: unknown or not mappable in this direction, wrong bit length, too long.
     """
@@ -62,7 +62,7 @@ class InputImage:
         self._entries = [part for part in parts if isinstance(part, Entry)]
 
     def pack(self) -> bytes:
-        """Current values."""
+        """Return the present values."""
         # The getters are looked up on every call: a restart of the firmware replaces them.
         values = [
             entry.value if entry.getter is None else entry.getter() for entry in self._entries
@@ -73,7 +73,7 @@ class InputImage:
             return self._struct.pack(*[entry.current() for entry in self._entries])
 
     def unpack(self, data: bytes) -> None:  # noqa: ARG002 - the seam's signature
-        """Inputs cannot be written."""
+        """Refuse the access: inputs cannot be written."""
         raise SdoAbort(ABORT_NOT_MAPPABLE)
 
 
@@ -92,12 +92,12 @@ class OutputImage:
         self._writes = -1
 
     def pack(self) -> bytes:
-        """The outputs as they stand in the dictionary."""
+        """Return the outputs as in the dictionary."""
         return self._struct.pack(*[entry.current() for entry in self._entries])
 
     def unpack(self, data: bytes) -> None:
-        """Take over one cycle's outputs; setpoints first, the control word last."""
-        # Process data overrule what another access wrote in between.
+        """Apply one cycle's outputs; setpoints first, the control word last."""
+        # Process data override what another access wrote in between.
         if data != self._last or self._writes != self._od.writes:
             self._last, self._writes = data, self._od.writes
             self._take(self._struct.unpack(data))
@@ -118,7 +118,7 @@ class OutputImage:
             try:
                 entry.setter(value)
             except SdoAbort:
-                # Nothing is reported: what the drive refuses has no effect.
+                # Nothing is reported: a refused value has no effect.
                 entry.value = entry.active = before
 
 

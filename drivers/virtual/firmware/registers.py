@@ -15,17 +15,17 @@ from profiles.schema import Profile
 
 
 class RegisterTable:
-    """Registers to entries. Values longer than 16 bits take several registers.
+    """Maps registers to entries. Values longer than 16 bits occupy several registers.
 
-    Each register is one of its own, as the manual prints them (003:633-673 and 003:905-990 give H
-    and L a line each): a master may ask for one half, and write one half with function 06.
+    Each register is separate, as the manual prints them (003:633-673 and 003:905-990 give H and L a
+    line each): a master may read one half, and write one half with function 06.
     """
 
     def __init__(self, profile: Profile, od: ObjectDictionary) -> None:
         modbus = next((link for link in profile.links if link.kind == "modbus"), None)
         high_first = modbus is None or modbus.word_order != "low_first"
         self._places: dict[int, tuple[Entry, int]] = {}
-        """Per register its entry and how many bits its word is shifted in the value."""
+        """For each register its entry and by how many bits its word is shifted in the value."""
         for entry in od:
             start = entry.parameter.modbus_register
             if start is None:
@@ -42,7 +42,7 @@ class RegisterTable:
         return place
 
     def read(self, register: int, count: int) -> list[int]:
-        """Values of ``count`` registers. The words of one value are of one moment."""
+        """Return the values of ``count`` registers. The words of one value are consistent."""
         words: list[int] = []
         held: dict[str, int] = {}
         for at in range(register, register + count):
@@ -54,16 +54,16 @@ class RegisterTable:
                 if isinstance(value, str):
                     raise SdoAbort(ABORT_NO_OBJECT)
                 held[entry.key] = int(value)
-            # Short values are sign-extended to the register, as their type says.
+            # Short values are sign-extended to the register, according to their type.
             words.append(held[entry.key] >> shift & 0xFFFF)
         return words
 
     def write(
         self, register: int, values: Sequence[int], write_entry: Callable[[Entry, bytes], None]
     ) -> None:
-        """Write registers; all words of one value at once, a half leaves the other as it is.
+        """Write registers; all words of one value at once, a half leaves the other unchanged.
 
-        A refusal in the middle leaves the values before it written.
+        After a refusal in the middle, the values before it remain written.
         """
         plan: dict[str, tuple[Entry, int]] = {}
         for at, word in enumerate(values, register):
@@ -75,7 +75,7 @@ class RegisterTable:
 
 
 def _raw(entry: Entry) -> int:
-    """The bits of an entry's value, without sign."""
+    """Return the bits of an entry's value, unsigned."""
     value = entry.current()
     if isinstance(value, str):
         raise SdoAbort(ABORT_NO_OBJECT)
@@ -83,7 +83,7 @@ def _raw(entry: Entry) -> int:
 
 
 def _stored(entry: Entry, value: int) -> bytes:
-    """A register's bits as the entry's bytes; what does not fit 8 bits is out of range."""
+    """Convert a register's bits to the entry's bytes; an 8-bit overflow is out of range."""
     if entry.size == 1:
         fits = range(0xFF80, 0x10000) if entry.parameter.type == "INT8" else range(0x80, 0x100)
         if value >= 0x80 and value not in fits:

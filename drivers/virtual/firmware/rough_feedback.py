@@ -1,4 +1,4 @@
-"""A drive that reports its motion otherwise than the others; see `RoughFeedbackSpec`."""
+"""A drive that reports its motion in a non-standard way; see `RoughFeedbackSpec`."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 _TWO_PI = 2.0 * math.pi
 _KEPT = 512
-#: Of a drive without options: increments, per second and per square second (CiA 303-2).
+#: Unit codes of a drive without options: increments, per second and per square second (CiA 303-2).
 _USUAL = {"60A8:00": 0x00B50000, "60A9:00": 0x00B50300, "60AA:00": 0x00B55700}
 
 
 def without_lacking(profile: Profile, rough: RoughFeedbackSpec) -> Profile:
-    """The profile of a drive that does not have some objects."""
+    """Return the profile of a drive without some objects."""
     if not rough.lacks:
         return profile
     lacking = {name.upper() for name in rough.lacks}
@@ -36,7 +36,7 @@ def without_lacking(profile: Profile, rough: RoughFeedbackSpec) -> Profile:
 
 
 def unit_values(profile: Profile, rough: RoughFeedbackSpec) -> dict[str, Raw]:
-    """What 60A8h to 60AAh hold, where the drive has them."""
+    """Return the values of 60A8h to 60AAh, if the drive has them."""
     stated = {
         "60A8:00": rough.position_unit,
         "60A9:00": rough.velocity_unit,
@@ -50,7 +50,7 @@ def unit_values(profile: Profile, rough: RoughFeedbackSpec) -> dict[str, Raw]:
 
 
 def rough_units(units: Units, rough: RoughFeedbackSpec) -> Units:
-    """Units of speeds and ramps by the codes that the drive holds."""
+    """Return units of speeds and ramps by the drive's unit codes."""
     if rough.velocity_unit is not None:
         per = _per_turn(rough.velocity_unit, units.position_per_rad)
         sign = math.copysign(1.0, units.speed_per_rad_s)
@@ -62,7 +62,7 @@ def rough_units(units: Units, rough: RoughFeedbackSpec) -> Units:
 
 
 def _per_turn(code: int, position_per_rad: float) -> float:
-    """Raw per rad/s, or per rad/s², of a code of 60A9h or 60AAh."""
+    """Return raw units per rad/s, or per rad/s², for a code of 60A9h or 60AAh."""
     unit = decode_si_unit(code)
     if unit is None or not (unit.counts or unit.turns):
         raise ValueError(f"a virtual drive has no speeds in the unit {code:08X}h")
@@ -72,7 +72,7 @@ def _per_turn(code: int, position_per_rad: float) -> float:
 
 
 class RoughSpeed:
-    """606Ch as this drive reports it: late, as a mean, in steps, by a factor."""
+    """606Ch as this drive reports it: delayed, averaged, quantised, scaled."""
 
     def __init__(self, core: Core) -> None:
         self._core = core
@@ -80,7 +80,7 @@ class RoughSpeed:
         self._past: deque[tuple[float, float]] = deque(maxlen=_KEPT)
 
     def __call__(self) -> Number:
-        """606Ch now, raw."""
+        """Return the present 606Ch, raw."""
         rough, core = self._rough, self._core
         speed = self._speed_rad_s()
         if rough.speed_step_rpm:
@@ -111,7 +111,7 @@ class RoughSpeed:
 
 
 def speed_value(core: Core, plain: Callable[[], Number]) -> Callable[[], Number]:
-    """The getter of 606Ch; the plain one where no option asks for another."""
+    """Return the getter of 606Ch; the plain one unless an option requires another."""
     usual = RoughFeedbackSpec()
     rough = core.axis.spec.rough_feedback
     same = ("speed_factor", "speed_step_rpm", "speed_late_s", "speed_mean_s")
@@ -121,7 +121,7 @@ def speed_value(core: Core, plain: Callable[[], Number]) -> Callable[[], Number]
 
 
 def position_value(core: Core, plain: Callable[[], Number]) -> Callable[[], Number]:
-    """The getter of 6064h; one that stands still where the option asks for it."""
+    """Return the getter of 6064h; a constant one if the option requires it."""
     if not core.axis.spec.rough_feedback.position_stands:
         return plain
     stood = plain()

@@ -1,4 +1,4 @@
-"""A rough axis' options as parameters of the 50 µs loop."""
+"""Options of a non-ideal axis as parameters of the 50 µs loop."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from drivers.virtual.mechanics import MechanicsSpec
 
 
 def write_rough_torque(p: Parameters, spec: MechanicsSpec) -> None:
-    """Everything of `RoughTorqueSpec`; friction moves from the plant where it begins as a spring.
+    """Write all of `RoughTorqueSpec`; presliding friction replaces that of the plant.
 
-    Must follow `loop_parameters.write_physics`, whose Coulomb friction it takes over.
+    Must follow `loop_parameters.write_physics`, whose Coulomb friction it replaces.
     """
     rough = spec.rough_torque
     p[k.P_ROUGH_ON] = rough.active

@@ -1,4 +1,4 @@
-"""Things a drive does after a time: one list behind the single alarm clock of the 50 µs loop."""
+"""Delayed actions of a drive: one list for the single alarm clock of the 50 µs loop."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.virtual.firmware.kernel import layout as k
 
 
 class Timer:
-    """One thing to come. ``cancel`` may be called at any time, also when it has been."""
+    """One delayed action. ``cancel`` may be called at any time, also afterwards."""
 
     __slots__ = ("_schedule", "action", "step")
 
@@ -19,7 +19,7 @@ class Timer:
         self.action = action
 
     def cancel(self) -> None:
-        """It will not come."""
+        """Cancel the action."""
         self._schedule.forget(self)
 
 
@@ -32,7 +32,7 @@ class Schedule:
         axis.set_alarm(None)
 
     def after(self, seconds: float, action: Callable[[], None]) -> Timer:
-        """Call ``action`` in so many seconds of the drive's time, one step at least."""
+        """Call ``action`` after this time of the drive's clock, at least one step."""
         steps = max(1, round(seconds / k.STEP_S))
         timer = Timer(self, float(self._axis.s[k.S_STEP]) + steps, action)
         self._timers.append(timer)
@@ -40,13 +40,13 @@ class Schedule:
         return timer
 
     def forget(self, timer: Timer) -> None:
-        """Take a timer out of the list."""
+        """Remove a timer from the list."""
         if timer in self._timers:
             self._timers.remove(timer)
             self._wind()
 
     def run(self) -> None:
-        """Everything that is due; called when the alarm clock rang."""
+        """Run all due actions; called on the alarm clock event."""
         now = float(self._axis.s[k.S_STEP])
         due = sorted((t for t in self._timers if t.step <= now), key=lambda t: t.step)
         for timer in due:

@@ -41,21 +41,21 @@ _RESET_AFTER_STEPS: Final = 400
 """20 ms from the reset command to the reset, so that the wire can still answer it."""
 _BOOT_S: Final = 0.3
 _OUTPUTS: Final = 0x60FE01
-#: Setpoints that the cyclic modes and bit 4 of the control word fetch by themselves.
+#: Setpoints that the cyclic modes and bit 4 of the control word read by themselves.
 _FETCHED: Final = frozenset({"607A:00", "60B0:00", "60B1:00", "60B2:00", "60FE:01", "60FE:02"})
 _OPTION_CODES: Final = frozenset({"605A:00", "605B:00", "605C:00", "605D:00", "605E:00"})
-#: Standard objects that change how the loops are set, not only windows and limits.
+#: Standard objects that change the loop settings, not only windows and limits.
 _UNIT_OBJECTS: Final = frozenset({0x6065, 0x6066, 0x607E, 0x608F, 0x6091, 0x6092})
 
 
 class SteppedTogether(Protocol):
-    """Several axes on one machine, which is stepped in one place."""
+    """Several axes on one machine, which are stepped together."""
 
     def begin(self, start_ns: int) -> None:
-        """The clock of all of them starts."""
+        """Start the clock of all of them."""
 
     def run(self, steps: int) -> int:
-        """Advance all by up to ``steps`` of 50 µs and let each drive react; returns those done."""
+        """Advance all by up to ``steps`` of 50 µs and let each drive react; return those done."""
 
 
 class VirtualServo:
@@ -90,7 +90,7 @@ class VirtualServo:
         self._off_until_ns: int | None = None
         self._reset_step: int | None = None
         self._maps_outputs = False
-        #: What steps this axis together with another one on the same beam; None for its own.
+        #: Steps this axis together with another one on the same beam; None for an axis of its own.
         self.stepped: SteppedTogether | None = None
         self._power_on()
 
@@ -114,7 +114,7 @@ class VirtualServo:
             self.control.faults.raise_bits(k.F_MEMORY)
 
     def power_cycle(self, off_s: float = 0.0) -> None:
-        """Off for a time and on again; the shaft coasts meanwhile, the absolute zero stays."""
+        """Switch off for a time and on again; the shaft coasts, the absolute zero is kept."""
         self.axis.power_off()
         self._zero_rad = self.core.zero_rad
         if off_s > 0 and self._start_ns is not None:
@@ -129,7 +129,7 @@ class VirtualServo:
 
     # --- time ------------------------------------------------------------------------------
     def advance(self, t_ns: int) -> None:
-        """Compute everything up to ``t_ns``; events are handled in the step they happen."""
+        """Compute everything up to ``t_ns``; events are handled in the step in which they occur."""
         if self._start_ns is None:
             self._start_ns = t_ns - int(self.axis.s[k.S_STEP]) * k.STEP_NS
             if self.stepped is not None:
@@ -160,18 +160,18 @@ class VirtualServo:
                 self.take_events()
 
     def take_events(self) -> None:
-        """React to what ended the last run of the loop."""
+        """React to the events that ended the last run of the loop."""
         events = self.axis.events
         if events and self._off_until_ns is None:
             self.control.on_events(events)
 
     def begin(self, start_ns: int) -> None:
-        """Its clock starts with that of an axis that it is stepped together with."""
+        """Start the clock with that of an axis stepped together with this one."""
         self._start_ns = start_ns
 
     # --- dictionary ------------------------------------------------------------------------
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an object. Raises SdoAbort."""
+        """Return the value of an object. Raises SdoAbort."""
         if self._commands.store is not None:
             self._commands.store.guard()
         return self.od.read(index, subindex)
@@ -194,7 +194,7 @@ class VirtualServo:
                 self.control.faults.raise_bits(k.F_MEMORY)
             raise
         if self._commands.load is not None and entry.key == "6040:00":
-            self._commands.load.stop()  # whoever commands the axis ends its own swings
+            self._commands.load.stop()  # a command ends the drive's own identification motion
         if entry.parameter.effective == "stopped" and not self.axis.powered:
             entry.active = entry.value
             self.core.apply_settings()
@@ -203,7 +203,7 @@ class VirtualServo:
         self._terminals_changed()
 
     def _check_protection(self, entry: Entry) -> None:
-        """A parameter that protects the others from being written (P02.21, 000:3248)."""
+        """Check the parameter that protects others from being written (P02.21, 000:3248)."""
         protect = self._family.traits.write_protect
         if protect is None or not 0x2000 <= (entry.parameter.index or 0) < 0x6000:
             return
@@ -212,7 +212,7 @@ class VirtualServo:
             raise SdoAbort(ABORT_READ_ONLY)
 
     def read_register(self, register: int, count: int) -> list[int]:
-        """Registers of the profile's table, 32-bit values in its word order."""
+        """Return registers of the profile's table, 32-bit values in its word order."""
         return self._registers.read(register, count)
 
     def write_registers(self, register: int, values: Sequence[int]) -> None:
@@ -220,15 +220,15 @@ class VirtualServo:
         self._registers.write(register, values, self._write_entry)
 
     def indices(self) -> Sequence[int]:
-        """All object indices, ascending."""
+        """Return all object indices, ascending."""
         return self.od.indices()
 
     def subindices(self, index: int) -> Sequence[int]:
-        """All subindices of an object, ascending. Raises SdoAbort."""
+        """Return all subindices of an object, ascending. Raises SdoAbort."""
         return self.od.subindices(index)
 
     def entry(self, index: int, subindex: int) -> EntryInfo:
-        """Description of an entry. Raises SdoAbort."""
+        """Return the description of an entry. Raises SdoAbort."""
         return self.od.info(index, subindex)
 
     # --- process data ----------------------------------------------------------------------
@@ -271,7 +271,7 @@ class VirtualServo:
                 entry.setter = self._reaction(entry)
 
     def _reaction(self, entry: Entry) -> Callable[[Raw], None] | None:
-        """What an ordinary parameter that acts at once sets in motion."""
+        """Return the reaction to an ordinary parameter that acts at once."""
         if entry.key in _FETCHED:
             return None
         listed = self._family.traits.listed_options_only and bool(entry.parameter.enum)
@@ -283,7 +283,7 @@ class VirtualServo:
         return self._motion_object_changed
 
     def _listed_option(self, entry: Entry) -> Callable[[Raw], None]:
-        """Only the values that the manual lists (M6-L 000:3017, EP3E 001:885)."""
+        """Return a check for values listed in the manual (M6-L 000:3017, EP3E 001:885)."""
 
         def check(value: Raw) -> None:
             if int(value) not in entry.parameter.enum:
@@ -310,15 +310,18 @@ class VirtualServo:
         if self._watches_terminals and self.panel.update():
             self.control.faults.reset()
 
-    # --- trouble ---------------------------------------------------------------------------
+    # --- failures --------------------------------------------------------------------------
     def communication_lost(self, reason: str) -> None:  # noqa: ARG002 - the seam's signature
-        """The wire's watchdog fired or the network state fell."""
+        """React when the wire's watchdog expired or the network state fell."""
         if isinstance(self.panel, Terminals):
             self.panel.bus_lost()
         self.control.communication_lost()
 
     def network_started(self) -> None:
-        """A family whose gear acts with the network takes over what waits (001:1002, 001:1036)."""
+        """Apply pending gear settings.
+
+        Only in families where they become active with the network (001:1002, 001:1036).
+        """
         if not self._family.traits.acts_with_network or self.axis.powered:
             return
         self.od.activate("power_cycle")
@@ -328,7 +331,7 @@ class VirtualServo:
             self.control.faults.raise_entry(fault)
 
     def take_emergencies(self) -> list[Emergency]:
-        """Emergencies since the last call."""
+        """Return emergencies since the last call."""
         waiting = self.control.faults.emergencies
         if not waiting:
             return []
@@ -342,17 +345,17 @@ class VirtualServo:
         return self.axis.angle_rad / (2.0 * math.pi)
 
     def inject(self, what: str, value: float = 1.0) -> None:
-        """Trouble by name.
+        """Cause a failure by name.
 
         A fault's name (``over_current`` … ``watchdog``), its code in the profile's table
         (``Er.013``, ``AL.247`` …) or in 603Fh (``0x7121``) latches it; a warning's code shows it;
         ``encoder_loss`` (1/0), ``supply_v``, ``ambient_c``, ``temperature_c``, ``load_nm`` (the
         constant torque of gravity) and ``coulomb_nm`` change the machine; ``turn_to_rev`` turns the
-        shaft by hand; ``di1`` … set terminals
-        without a switch; ``power_off`` switches off for ``value`` seconds.
+        shaft by hand; ``di1`` … set terminals without a switch; ``power_off`` switches off for
+        ``value`` seconds.
 
         Raises:
-            ValueError: this drive has no such trouble.
+            ValueError: this drive does not support this failure.
         """
         if what == "power_off":
             self.power_cycle(value)

@@ -1,7 +1,7 @@
-"""What a family's parameters mean to the control loops, in SI units.
+"""Settings of the control loops in SI units.
 
-Every family converts its own gains, filters and thresholds into these records; the loops know
-nothing of 0.1 Hz, rigidity levels or ‰.
+Every family converts its own gains, filters and thresholds to these records; the loops use no units
+such as 0.1 Hz, rigidity levels or ‰.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Biquad:
 
 
 def notch_biquad(centre_hz: float, width_hz: float, depth_db: float, step_s: float) -> Biquad:
-    """Backward-difference notch: −3 dB bandwidth and depth in dB (negative), 004:3494-3499."""
+    """Return a backward-difference notch: −3 dB width, depth in dB (negative), 004:3494-3499."""
     w = (2 * math.pi * centre_hz * step_s) ** 2
     g = 2 * math.pi * width_hz * step_s
     d = 10 ** (depth_db / 20)
@@ -41,7 +41,7 @@ class GainSet:
 
 @dataclass(frozen=True, slots=True)
 class Switching:
-    """When the second gains act: ``kind`` is one of the kernel's SWITCH_*, levels in SI units."""
+    """Switching to the second gains: ``kind`` is one of SWITCH_*, levels in SI units."""
 
     kind: int = 0
     level: float = 0.0
@@ -62,7 +62,7 @@ class Compensation:
 
 @dataclass(frozen=True, slots=True)
 class ThirdGains:
-    """Gains that hold an axis whose position command has rested for ``delay_s``."""
+    """Gains that hold an axis whose position command has been constant for ``delay_s``."""
 
     gains: GainSet
     delay_s: float
@@ -78,7 +78,7 @@ class SwingFilter:
 
 @dataclass(frozen=True, slots=True)
 class QuadrantCompensation:
-    """Torque in the new direction after the command has turned round, over ``angle_rad``."""
+    """Torque in the new direction after a reversal of the command, over ``angle_rad``."""
 
     positive_nm: float = 0.0
     negative_nm: float = 0.0
@@ -89,7 +89,7 @@ class QuadrantCompensation:
 
 @dataclass(frozen=True, slots=True)
 class LoopSettings:
-    """Everything between command and current loop."""
+    """All settings between command and current loop."""
 
     first: GainSet
     second: GainSet
@@ -123,7 +123,7 @@ class LoopSettings:
 
 @dataclass(frozen=True, slots=True)
 class ProtectionSettings:
-    """Thresholds; infinite (or zero for under-voltage) where a protection is off."""
+    """Thresholds; infinite (or zero for under-voltage) if a protection is off."""
 
     over_current_a: float = math.inf
     under_voltage_v: float = 0.0
@@ -149,8 +149,9 @@ class ProtectionSettings:
 
 @dataclass(frozen=True, slots=True)
 class ImpedanceSettings:
-    """Gains of the impedance controller. Their units are not printed (004:4570-4577): Nm/rad,
-    Nm/(rad·s) and Nm/(rad/s) are assumed.
+    """Gains of the impedance controller.
+
+    Their units are not printed (004:4570-4577): Nm/rad, Nm/(rad·s) and Nm/(rad/s) are assumed.
     """
 
     kp: float
@@ -162,11 +163,11 @@ class ImpedanceSettings:
 
 @dataclass(frozen=True, slots=True)
 class MotorData:
-    """Electrical side of the motor that turns these mechanics.
+    """Electrical data of the motor for these mechanics.
 
     The torque constant is the largest whose back EMF at 1.2 times rated speed uses 80 % of the
-    phase voltage that space-vector modulation makes of the bus; copper losses at rated current
-    are 8 % of rated power. Currents are RMS phase currents.
+    phase voltage that space-vector modulation generates from the bus; copper losses at rated
+    current are 8 % of rated power. Currents are RMS phase currents.
     """
 
     torque_constant: float

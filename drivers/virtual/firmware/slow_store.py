@@ -1,4 +1,4 @@
-"""Storing that takes time and bears no SDO meanwhile: 1010h:01 of the EP3E (001:1209-1212)."""
+"""Storing that takes time and permits no SDO meanwhile: 1010h:01 of the EP3E (001:1209-1212)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _KEY = "1010:01"
 
 
 class SlowStore:
-    """1010h:01 reads 1 from the start and after a failure, 0 after a success.
+    """1010h:01 reads 1 after power-on and after a failure, 0 after a success.
 
-    The longest time is printed for all objects changed; a share of them takes a share of it. An
-    SDO that comes meanwhile spoils the operation: Err68.
+    The longest time is printed for the change of all objects; a share of them takes that share of
+    it. An SDO access meanwhile aborts the operation: Err68.
     """
 
     def __init__(self, core: Core, failed: Callable[[], None]) -> None:
@@ -27,7 +27,7 @@ class SlowStore:
         core.od.put(_KEY, 1)
 
     def begin(self, operation: Callable[[], None], share: float) -> None:
-        """Carry out the operation when its time has passed."""
+        """Execute the operation after its time has passed."""
         self.busy, self._spoiled = True, False
         wait_s = max(_SHORTEST_S, _LONGEST_S * share)
         self._core.schedule.after(wait_s, lambda: self._end(operation))
@@ -45,7 +45,7 @@ class SlowStore:
             self._failed()
 
     def guard(self) -> None:
-        """An SDO access: refused while storing, which it spoils."""
+        """Refuse an SDO access while storing, which it aborts."""
         if self.busy:
             self._spoiled = True
             raise SdoAbort(ABORT_DEVICE_STATE)

@@ -19,7 +19,7 @@ class State(Enum):
 
 
 class Command(Enum):
-    """What the control word asks for (table 45, 004:3609-3621)."""
+    """Command in the control word (table 45, 004:3609-3621)."""
 
     SHUTDOWN = "shutdown"
     SWITCH_ON = "switch on"
@@ -29,7 +29,7 @@ class Command(Enum):
 
 
 def decode(control_word: int) -> Command:
-    """Command in bits 0 to 3; the fault reset edge in bit 7 is looked at elsewhere."""
+    """Return the command in bits 0 to 3; the fault reset edge in bit 7 is handled elsewhere."""
     if not control_word & 0x02:
         return Command.DISABLE_VOLTAGE
     if not control_word & 0x04:
@@ -40,7 +40,7 @@ def decode(control_word: int) -> Command:
 
 
 _S, _C = State, Command
-#: Next state per state and command; what is not here is ignored. The drive passes "switched on"
+#: Next state per state and command; other combinations are ignored. The drive passes "switched on"
 #: by itself when "enable operation" comes in "ready to switch on" (note 13, 004:3624).
 TRANSITIONS: dict[tuple[State, Command], State] = {
     (_S.SWITCH_ON_DISABLED, _C.SHUTDOWN): _S.READY,  # 2
@@ -62,5 +62,5 @@ TRANSITIONS: dict[tuple[State, Command], State] = {
 
 
 def next_state(state: State, command: Command) -> State:
-    """Where the command leads; the same state if it does not apply."""
+    """Return the next state; the same state if the command does not apply."""
     return TRANSITIONS.get((state, command), state)

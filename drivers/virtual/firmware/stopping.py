@@ -1,6 +1,6 @@
-"""Bringing an axis to rest: ramps, torques, coasting and dynamic braking of each family.
+"""Stopping an axis: ramps, torques, coasting and dynamic braking of each family.
 
-``begin``, ``servo_off`` and ``react`` return whether EV_STOPPED is to be awaited.
+``begin``, ``servo_off`` and ``react`` return whether to wait for EV_STOPPED.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Stopping:
         self._then = "free"
 
     def begin(self, option: int) -> bool:
-        """Options 0 to 4 of 605Ah–605Eh (004:2451-2551, 001:880-935)."""
+        """Start options 0 to 4 of 605Ah–605Eh (004:2451-2551, 001:880-935)."""
         axis, core, traits = self._axis, self._core, self._traits
         self._then = "free"
         ramp = traits.ramps.get(option)
@@ -53,7 +53,7 @@ class Stopping:
         return True
 
     def coast(self) -> bool:
-        """Power off now; the state changes when the axis is at standstill (001:882)."""
+        """Switch power off now; the state changes when the axis is at standstill (001:882)."""
         self._axis.power_off()
         if abs(self._axis.speed_rad_s) <= self._axis.p[k.P_STOP_SPEED]:
             return False
@@ -61,7 +61,7 @@ class Stopping:
         return True
 
     def servo_off(self, choice: tuple[str, dict[int, OffStop]]) -> bool:
-        """As a parameter chooses: (while moving, afterwards)."""
+        """Stop as a parameter selects: (while moving, afterwards)."""
         key, ways = choice
         moving, self._then = ways.get(int(self._core.number(key, -1)), _COAST)
         if moving == "ramp":
@@ -74,7 +74,7 @@ class Stopping:
         return True
 
     def react(self, faults: Sequence[FaultInfo], option: int) -> bool:
-        """Fault reaction: 605Eh, off at once, or the parameter for the kind of fault."""
+        """Start the fault reaction: 605Eh, off at once, or the parameter for the kind of fault."""
         traits = self._traits
         self._then = "free"
         if traits.reaction == "off":
@@ -91,7 +91,7 @@ class Stopping:
         return entry is None or entry.severity.startswith("first")
 
     def after_rest(self, axis: VirtualAxis) -> None:
-        """What remains when the stop is over."""
+        """Apply the final state after the stop."""
         if self._then == "hold":
             axis.hold()
         elif axis.powered or axis.p[k.P_STOPPING] > 0:

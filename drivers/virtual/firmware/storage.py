@@ -1,4 +1,4 @@
-"""Where parameter values come from at power-on and where they are saved."""
+"""Sources of parameter values at power-on, and their storage."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VOLATILE: Final = frozenset(
 
 
 class Storage:
-    """Printed defaults, the maker's values for this motor, and the NVM over both."""
+    """Printed defaults, the factory settings for this motor, and the NVM over both."""
 
     def __init__(
         self,
@@ -40,10 +40,10 @@ class Storage:
         self._volatile = VOLATILE | set(family.traits.commands)
         self.nvm = Nvm(nvm_path)
         self.writes = 0
-        """Times that the memory was written since the drive was made; it wears (Er.013)."""
+        """Number of writes to the memory since the drive was created; it wears out (Er.013)."""
 
     def power_on(self) -> None:
-        """Every value as after switching on."""
+        """Set every value as after switching on."""
         for entry in self._od:
             entry.value = entry.active = entry.default()
         self._load_factory()
@@ -61,14 +61,14 @@ class Storage:
         self._od.load(self._family.factory_values(self._mechanics, self._motor))
 
     def changed_share(self) -> float:
-        """Share of the storable values that differ from what is stored, 0 to 1."""
+        """Return the share of the storable values that differ from the stored ones, 0 to 1."""
         stored = self.nvm.load()
         entries = [e for e in self._od if e.parameter.access == "rw"]
         changed = sum(e.value != stored.get(e.key, e.default()) for e in entries)
         return changed / max(len(entries), 1)
 
     def save(self) -> None:
-        """All writable parameters to the NVM. Raises SdoAbort if it cannot be written."""
+        """Save all writable parameters to the NVM. Raises SdoAbort if it cannot be written."""
         self._store(
             {
                 entry.key: entry.value
@@ -78,7 +78,7 @@ class Storage:
         )
 
     def restore(self) -> None:
-        """Factory values, in use and in the NVM. Raises SdoAbort if it cannot be written."""
+        """Restore factory values, in use and in the NVM. Raises SdoAbort on failure."""
         self._store({})
         for entry in self._od:
             if entry.parameter.access != "ro" and entry.key not in self._volatile:
@@ -86,7 +86,7 @@ class Storage:
         self._load_factory()
 
     def autosave(self, entry: Entry) -> None:
-        """Families that store what is written: only this value, as their EEPROM does."""
+        """Store a single written value in families that do so, as their EEPROM does."""
         index = entry.parameter.index
         if index is None or entry.key in self._volatile or entry.parameter.access != "rw":
             return

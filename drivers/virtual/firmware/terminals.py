@@ -1,4 +1,4 @@
-"""Terminals and touch probes of the families whose terminals are tables of functions."""
+"""Terminals and touch probes of families whose terminals are tables of functions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LATCHES = ("60BA:00", "60BB:00", "60BC:00", "60BD:00")
 
 
 class Terminals:
-    """Levels of the terminals. ``external`` holds levels set from outside the mechanics."""
+    """Levels of the terminals. ``external`` contains levels set from outside the mechanics."""
 
     def __init__(self, core: Core, control: DeviceControl, table: TerminalTable) -> None:
         self._core = core
@@ -41,11 +41,11 @@ class Terminals:
 
     # --- inputs ----------------------------------------------------------------------------
     def level(self, place: int) -> bool:
-        """Logic level of an input: after polarity and forcing."""
+        """Return the logic level of an input: after polarity and forcing."""
         return self._pins[place].level(self.external[place], self._pressed())
 
     def _pressed(self) -> int:
-        """Switches as the mechanics presses them."""
+        """Return the switches activated by the mechanics."""
         axis = self._core.axis
         angle, limit = axis.s.item(k.S_THETA), axis.p.item
         pressed = k.SIG_NEGATIVE if angle <= limit(k.P_LIMIT_NEGATIVE) else 0
@@ -54,15 +54,15 @@ class Terminals:
         return pressed | (k.SIG_HOME if inside else 0)
 
     def active(self, use: InputUse) -> bool:
-        """Whether any input with this function is on."""
+        """Return whether any input with this function is on."""
         return any(pin.use == use and self.level(place) for place, pin in enumerate(self._pins))
 
     def input_bits(self) -> int:
-        """Inputs as bits from the first on."""
+        """Return the inputs as bits, starting with the first."""
         return sum(self.level(place) << place for place in range(len(self._table.inputs)))
 
     def digital_inputs(self) -> int:
-        """60FDh."""
+        """Return 60FDh."""
         signals = int(self._core.axis.s[k.S_SIGNALS]) & 7
         if self._core.family.traits.limit_bits_swapped:
             signals = signals & 4 | (signals & 1) << 1 | signals >> 1 & 1
@@ -97,9 +97,9 @@ class Terminals:
         return shown is not None and shown()
 
     def cycle(self, *, carries_outputs: bool) -> None:
-        """Process data arrived, with 60FEh or without it.
+        """Handle the arrival of process data, with or without 60FEh.
 
-        Outputs may follow the bus then; the brake of an EP3E only where 60FEh came along.
+        Outputs may then follow the bus; the brake of an EP3E only if 60FEh was included.
         """
         self._cyclic = True
         if carries_outputs and self._core.family.traits.brake_by_bus:
@@ -108,7 +108,7 @@ class Terminals:
             self._control.brake.follow_bus(bool(value & 1) or faulty if mask & 1 else None)
 
     def bus_lost(self) -> None:
-        """Process data ended: outputs of the bus stay or go off, by P20.27 (000:3124-3132)."""
+        """Keep or switch off outputs when process data end, by P20.27 (000:3124-3132)."""
         if not self._cyclic:
             return
         value, mask = self._bus_outputs()
@@ -117,11 +117,11 @@ class Terminals:
         self._cyclic = False
 
     def _bus_outputs(self) -> tuple[int, int]:
-        """60FEh:01 and its mask."""
+        """Return 60FEh:01 and its mask."""
         return int(self._core.number("60FE:01")), int(self._core.number("60FE:02"))
 
     def _forced(self, terminal: Output, use: OutputUse | None) -> bool | None:
-        """Level that the bus gives an output, None where the drive rules."""
+        """Return the level that the bus sets for an output, None if the drive controls it."""
         table, (value, mask) = self._table, self._bus_outputs()
         if terminal.bit is None or (table.bus_outputs_need_function and use != "bus"):
             return None
@@ -132,7 +132,7 @@ class Terminals:
         return bool(value >> terminal.bit & 1)
 
     def output_bits(self) -> int:
-        """Outputs as bits from the first on, forced by 60FEh where its mask says so."""
+        """Return the outputs as bits, starting with the first, forced by 60FEh if masked."""
         core = self._core
         bits = 0
         for place, terminal in enumerate(self._table.outputs):
@@ -149,7 +149,7 @@ class Terminals:
 
     # --- reactions -------------------------------------------------------------------------
     def update(self) -> bool:
-        """Something may have changed; True asks for a fault reset."""
+        """Update after a possible change; True requests a fault reset."""
         self._update_probes()
         uses: tuple[InputUse, ...] = ("reset", "emergency", "gain", "fault")
         now: dict[InputUse, bool] = {use: self.active(use) for use in uses}
@@ -170,7 +170,7 @@ class Terminals:
 
     # --- touch probes ----------------------------------------------------------------------
     def set_probe_function(self, word: int) -> None:
-        """60B8h: enabling again forgets what was latched."""
+        """Apply 60B8h: enabling again clears the latched state."""
         rising = word & ~self._probe_function
         for probe, shift in ((0, 0), (1, 8)):
             if rising >> shift & 1 or not word >> shift & 1:
@@ -209,13 +209,13 @@ class Terminals:
         self._probe_status |= done
 
     def probe_status(self) -> int:
-        """60B9h."""
+        """Return 60B9h."""
         return self._probe_status | (self._probe_function & 0x0101)
 
     def latched(self, key: str) -> int:
-        """60BAh to 60BDh."""
+        """Return one of 60BAh to 60BDh."""
         return self._latched[key]
 
     def latch_count(self, place: int) -> int:
-        """60D5h to 60D8h of the R6L."""
+        """Return one of 60D5h to 60D8h of the R6L."""
         return self._counts[place]

@@ -1,4 +1,4 @@
-"""Trouble made on purpose, for tests and training."""
+"""Deliberate failures, for tests and training."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ _PHYSICS: Final = {
 def make_trouble(
     core: Core, control: DeviceControl, panel: Panel | Terminals, what: str, value: float
 ) -> None:
-    """One trouble by name; see `VirtualServo.inject`.
+    """Cause one failure by name; see `VirtualServo.inject`.
 
     Raises:
-        ValueError: this drive has no such trouble.
+        ValueError: this drive does not support this failure.
     """
     if what in _PHYSICS:
         core.axis.p[_PHYSICS[what]] = value
@@ -61,7 +61,7 @@ def make_trouble(
 
 
 def _entry(control: DeviceControl, what: str) -> Fault | None:
-    """An entry of the fault table by its code or the value of 603Fh."""
+    """Return an entry of the fault table by its code or the value of 603Fh."""
     found = control.alarms.find(what)
     if found is None and what.startswith("0x"):
         found = control.alarms.find_raw(int(what, 16))
@@ -69,7 +69,7 @@ def _entry(control: DeviceControl, what: str) -> Fault | None:
 
 
 def _protection_of(core: Core, code: str) -> int:
-    """The protection that reports this entry, 0 if none does."""
+    """Return the protection that reports this entry, 0 if none does."""
     return next((b for b, info in core.family.traits.faults.items() if info.fault == code), 0)
 
 

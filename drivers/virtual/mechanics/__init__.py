@@ -1,4 +1,4 @@
-"""The machine that a virtual drive turns: an inertia chain with friction, gravity and stops."""
+"""The machine driven by a virtual drive: an inertia chain with friction, gravity and end stops."""
 
 from drivers.virtual.mechanics.chain import analytic_response
 from drivers.virtual.mechanics.friction_curve import friction_nm, ripple_nm

@@ -1,9 +1,9 @@
 """The linear part of the inertia chain: continuous model, exact discretisation, response.
 
-State ``[θ0, ω0, τ, φ1, ω1, … φN, ωN]``: motor angle and speed, motor torque (first-order
-current loop), then per load the twist of its coupling (angle before minus angle behind) and its
-speed. Inputs ``[u, d_motor, d_last, s…]``: torque command, torque on the motor, torque on the
-last inertia, and per coupling with backlash the side of the gap that is in contact (−1, +1).
+State ``[θ0, ω0, τ, φ1, ω1, … φN, ωN]``: motor angle and speed, motor torque (first-order current
+loop), then per load the twist of its coupling (angle before minus angle behind) and its speed.
+Inputs ``[u, d_motor, d_last, s…]``: torque command, torque on the motor, torque on the last
+inertia, and per coupling with backlash the side of the gap that is in contact (−1, +1).
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ INPUT_COMMAND, INPUT_MOTOR, INPUT_LAST, FIRST_SIDE = 0, 1, 2, 3
 class DiscreteChain:
     """Exact zero-order-hold model for every combination of couplings in contact.
 
-    ``a`` has shape [2^m, n, n] and ``b`` [2^m, n, 3 + m]; bit i of the first index says that
-    the i-th coupling with backlash is in contact. ``gap_state`` [m] is the state index of that
+    ``a`` has shape [2^m, n, n] and ``b`` [2^m, n, 3 + m]; bit i of the first index means that the
+    i-th coupling with backlash is in contact. ``gap_state`` [m] is the state index of that
     coupling's twist and ``half_gap_rad`` [m] half its backlash.
     """
 
@@ -43,7 +43,7 @@ class DiscreteChain:
 def continuous_chain(
     spec: MechanicsSpec, current_loop_rad_s: float, open_couplings: frozenset[int] = frozenset()
 ) -> tuple[Array, Array]:
-    """Continuous matrices with the couplings of these load numbers (from 0) open."""
+    """Return continuous matrices, with the couplings of these load numbers (from 0) open."""
     gaps = [i for i, load in enumerate(spec.load) if load.backlash_rad > 0]
     size = FIRST_LOAD + 2 * len(spec.load)
     a = np.zeros((size, size))
@@ -75,9 +75,9 @@ def continuous_chain(
 
 @lru_cache(maxsize=256)
 def discretise(spec: MechanicsSpec, current_loop_rad_s: float, step_s: float) -> DiscreteChain:
-    """Zero-order-hold discretisation by the matrix exponential (Van Loan 1978).
+    """Return the zero-order-hold discretisation by the matrix exponential (Van Loan 1978).
 
-    The arrays are shared by all who ask for the same chain: they are not to be written.
+    The arrays are cached and shared by all callers with the same chain: do not write to them.
     """
     spec = _without_ringing(spec, step_s)
     gaps = [i for i, load in enumerate(spec.load) if load.backlash_rad > 0]
@@ -99,13 +99,12 @@ def discretise(spec: MechanicsSpec, current_loop_rad_s: float, step_s: float) ->
 
 
 def _without_ringing(spec: MechanicsSpec, step_s: float) -> MechanicsSpec:
-    """The chain in which what is too stiff for the steps is well damped.
+    """Return the chain with damping added to couplings that are too stiff for the step.
 
-    Stiffnesses such as 1e7 Nm/rad are written for "rigid". Between two steps such a coupling
-    swings more than once, so that friction and end stops, which act once a step, would push it
-    the wrong way and blow it up. Damped, it is as stiff as before: with half of the critical
-    damping above the sampling rate, 20 kHz, the response up to 2 kHz changes by less than 0.02 dB
-    and 0.7°.
+    Stiffnesses such as 1e7 Nm/rad mean "rigid". Between two steps such a coupling oscillates more
+    than once, so that friction and end stops, which act once a step, would push it the wrong way
+    and make it unstable. With damping it is as stiff as before: with half of the critical damping
+    above the sampling rate, 20 kHz, the response up to 2 kHz changes by less than 0.02 dB and 0.7°.
     """
     loads: list[LoadSpec] = []
     before_kgm2 = spec.motor.inertia_kgm2
@@ -124,7 +123,7 @@ def _without_ringing(spec: MechanicsSpec, step_s: float) -> MechanicsSpec:
 def analytic_response(
     spec: MechanicsSpec, f_hz: float | npt.ArrayLike
 ) -> npt.NDArray[np.complex128]:
-    """Torque to motor velocity of the linear chain, in (rad/s)/Nm, shaped like ``f_hz``.
+    """Return torque to motor velocity of the linear chain, in (rad/s)/Nm, shaped like ``f_hz``.
 
     Built from the far end of the chain towards the motor by impedances: an inertia is ``sJ``, a
     coupling ``k/s + d`` in series with everything behind it, viscous friction ``b`` at the motor.

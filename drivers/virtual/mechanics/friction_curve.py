@@ -1,4 +1,4 @@
-"""What a virtual axis needs of torque at a constant speed: the truth that tests measure against."""
+"""Torque of a virtual axis at constant speed: the reference for tests of measurements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 
 def friction_nm(spec: MechanicsSpec, speed_rad_s: npt.ArrayLike) -> Array:
-    """Friction in Nm at constant speeds that are not zero, signed as the motor has to make it."""
+    """Return friction [Nm] at constant non-zero speeds, signed as required of the motor."""
     speed, of = np.asarray(speed_rad_s, dtype=np.float64), spec.friction
     slow = np.abs(speed) / of.stribeck_rad_s
     falling = 1.0 - np.tanh(slow) if of.stribeck_law == "tanh" else np.exp(-(slow**2))
@@ -21,7 +21,7 @@ def friction_nm(spec: MechanicsSpec, speed_rad_s: npt.ArrayLike) -> Array:
 
 
 def ripple_nm(spec: MechanicsSpec, angle_rad: npt.ArrayLike) -> Array:
-    """Periodic torque of the motor in Nm by its angle, as the motor has to make it."""
+    """Return the periodic motor torque [Nm] by its angle, signed as required of the motor."""
     angle, of = np.asarray(angle_rad, dtype=np.float64), spec.ripple
     harmonics = (
         (1, of.revolution_nm),

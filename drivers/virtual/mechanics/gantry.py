@@ -1,9 +1,9 @@
-"""A beam that two motors move: what it is made of, its exact discretisation and its response.
+"""A beam moved by two motors: its specification, exact discretisation and response.
 
 All quantities are at the motor shafts. State ``[θ1, ω1, τ1, θ2, ω2, τ2, b, b', d, d']``: angle,
 speed and torque of each motor (first-order current loops), then mean and difference of the beam's
 ends. Inputs ``[u1, u2, m1, m2, 1]``: both torque commands, torques on both motors, and a constant
-for the beam that is out of square.
+for a beam that is out of square.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from drivers.virtual.mechanics.spec import MechanicsSpec
 
 Array = npt.NDArray[np.float64]
 STATES, INPUTS = 10, 5
-#: Places of each motor among the states, and of the beam.
+#: Position of the second motor and of the beam among the states.
 SECOND, MEAN, DIFFERENCE = 3, 6, 8
 
 
 class GantrySpec(BaseModel):
     """The beam between the motors of two ``axes``, named as in the bench.
 
-    ``inertia_kgm2`` is that of beam and carriage together, as both motors see it turning alike;
-    ``yaw_inertia_kgm2`` that of turning the beam, for the difference of its ends. The carriage
-    stands ``off_centre`` of the span, towards the first axis. Each end hangs on its motor by a
-    joint. Guides turn the beam back by ``yaw_stiffness_nm_per_rad`` for the difference of its
-    ends, to where that is ``square_error_rad`` (first less second): 0 for a gantry that is square
-    where both motors show the same position, as they do at the start.
+    ``inertia_kgm2`` is that of beam and carriage together for equal motion of both motors;
+    ``yaw_inertia_kgm2`` that of the yaw motion, for the difference of its ends. The carriage is
+    ``off_centre`` of the span, towards the first axis. Each end is connected to its motor by a
+    joint. Guides turn the beam back by ``yaw_stiffness_nm_per_rad`` for the difference of its ends,
+    to where that is ``square_error_rad`` (first less second): 0 for a gantry that is square where
+    both motors show the same position, as they do at the start.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -51,7 +51,7 @@ class GantrySpec(BaseModel):
 def _matrices(
     spec: GantrySpec, motors: tuple[MechanicsSpec, MechanicsSpec]
 ) -> tuple[Array, Array, Array]:
-    """Mass, damping and stiffness of motor 1, motor 2, mean and difference of the beam's ends."""
+    """Return mass, damping and stiffness of motor 1, motor 2, mean and difference of the ends."""
     beam, off = spec.inertia_kgm2, spec.off_centre
     mass = np.diag(
         [*(m.motor.inertia_kgm2 for m in motors), beam, spec.yaw_inertia_kgm2 + beam * off**2]
@@ -73,7 +73,7 @@ def continuous_gantry(
     motors: tuple[MechanicsSpec, MechanicsSpec],
     current_loops_rad_s: tuple[float, float],
 ) -> tuple[Array, Array]:
-    """Continuous matrices."""
+    """Return the continuous matrices."""
     mass, damping, stiffness = _matrices(spec, motors)
     inverse = np.linalg.inv(mass)
     angles, speeds = np.array([0, SECOND, MEAN, DIFFERENCE]), np.array([1, 4, 7, 9])
@@ -96,7 +96,7 @@ def discretise_gantry(
     current_loops_rad_s: tuple[float, float],
     step_s: float,
 ) -> tuple[Array, Array]:
-    """Zero-order hold by the matrix exponential (Van Loan 1978); not to be written."""
+    """Return the zero-order hold by the matrix exponential (Van Loan 1978); do not write to it."""
     a, b = continuous_gantry(spec, motors, current_loops_rad_s)
     block = np.zeros((STATES + INPUTS, STATES + INPUTS))
     block[:STATES, :STATES], block[:STATES, STATES:] = a * step_s, b * step_s
@@ -109,7 +109,7 @@ def discretise_gantry(
 def gantry_response(
     spec: GantrySpec, motors: tuple[MechanicsSpec, MechanicsSpec], f_hz: npt.ArrayLike
 ) -> npt.NDArray[np.complex128]:
-    """Torques to speeds of both motors [n, 2, 2] of the linear machine, in (rad/s)/Nm."""
+    """Return torques to speeds of both motors [n, 2, 2] of the linear machine, in (rad/s)/Nm."""
     mass, damping, stiffness = _matrices(spec, motors)
     s = (2j * math.pi * np.asarray(f_hz, dtype=np.float64))[:, None, None]
     return np.asarray(np.linalg.inv(s * mass + damping + stiffness / s)[:, :2, :2])

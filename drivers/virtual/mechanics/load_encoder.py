@@ -6,13 +6,13 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class LoadEncoderSpec(BaseModel):
-    """What the drive reads of the load, apart from the motor's encoder.
+    """The drive's second encoder, on the load.
 
     One revolution of the load is ``gear`` revolutions of the motor, and ``counts_per_rev`` counts.
     Mounted off its centre by ``eccentricity_rad`` (amplitude of the error at the load, once per
     load revolution), with an error of ``second_rad`` twice per revolution, both at ``phase_rad``.
     ``noise_counts`` is the standard deviation of white noise before it is rounded down to counts.
-    ``late_s`` is the age of what the drive reports.
+    ``late_s`` is the age of the reported value.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -1,7 +1,7 @@
-"""What drives and machines do that an analysis does not assume, as options of a virtual axis.
+"""Non-ideal behaviour of drives and machines that an analysis does not assume, as options.
 
 Each option has a structure of its own, not the one that `backend.analysis` fits: a held setpoint
-where 60C2h exists, a torque that is reported late or copied from the demand, a loop that runs at
+although there is a 60C2h, a torque that is reported late or copied from the demand, a loop with
 another period, friction that begins as a spring, a belt that creeps. All are off by default.
 """
 
@@ -13,23 +13,23 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class RoughTorqueSpec(BaseModel):
-    """Torque path, loop period and machine of a rough axis; everything 0 or off is as before.
+    """Torque path, loop period and machine of a non-ideal axis; all defaults have no effect.
 
-    ``holds_torque`` and ``holds_speed``: cyclic setpoints act at once and stay for the cycle,
+    ``holds_torque`` and ``holds_speed``: cyclic setpoints act at once and are held for the cycle,
     although the dictionary has 60C2h. ``reported``: 6077h is the current's torque or a copy of the
     demand, behind a first-order filter of ``reported_filter_s``. ``torque_filter_s``: a first-order
-    low-pass of the torque command that no parameter names. ``loop_period_s`` (50 µs or longer):
-    the torque changes once per period and the speed's difference is calculated over it.
+    low-pass of the torque command that is not a parameter. ``loop_period_s`` (50 µs or longer): the
+    torque changes once per period and the speed's difference is calculated over it.
     ``torque_constant``: true over nominal torque; 6077h stays nominal.
 
     ``presliding_rad``: friction is Dahl's (P. R. Dahl, 1968) with this rest length instead of
     Coulomb's; ``cogging_nm`` sin(``cogging_per_rev`` θ); ``drag_nm`` is a cable's hysteresis over
     ``drag_rad``. ``inertia_share`` sin(``inertia_per_rev`` θ) of the motor's inertia, and
     ``stiffness_share`` sin(``stiffness_per_rev`` θ) of the first coupling's stiffness, vary by
-    place. ``slip_per_s``: share of the first coupling's twist that a belt slips per second.
+    position. ``slip_per_s``: share of the first coupling's twist that a belt slips per second.
     ``dip_share`` of the torque is missing for ``dip_s`` out of every ``dip_every_s``, as with a
     supply that breaks down. ``interpolation_rad`` sin(``interpolation_per_rev`` θ) is the encoder's
-    error. ``jitter_s``: a cyclic setpoint acts later by up to this.
+    error. ``jitter_s``: a cyclic setpoint is delayed by up to this time.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

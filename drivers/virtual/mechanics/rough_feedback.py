@@ -1,4 +1,4 @@
-"""How a virtual drive may report its motion otherwise than the others: what real ones do."""
+"""Options for non-standard reporting of motion by a virtual drive, as found in real ones."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class RoughFeedbackSpec(BaseModel):
-    """Options of the firmware; the defaults change nothing.
+    """Options of the firmware; the defaults have no effect.
 
     ``velocity_unit`` and ``acceleration_unit`` are codes of 60A9h and 60AAh: the drive's speeds and
     ramps are in these units, also 60FFh and 6081h. ``speed_factor`` multiplies 606Ch alone: 10 for
-    a drive that reports 0.1 rpm where it states rpm, −1 for the other sign, 0 for one that stands
-    still. ``lacks`` names objects (``6092``) that the drive does not have.
+    a drive that reports 0.1 rpm but states rpm, −1 for the opposite sign, 0 for a constant value.
+    ``lacks`` names objects (``6092``) that the drive does not have.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

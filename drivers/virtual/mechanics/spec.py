@@ -1,4 +1,4 @@
-"""What the machine on a virtual drive's shaft is made of, as read from TOML.
+"""Specification of the machine on a virtual drive's shaft, as read from TOML.
 
 All quantities are at the motor shaft. Positive torque turns towards positive positions.
 """
@@ -16,7 +16,7 @@ from drivers.virtual.mechanics.load_encoder import LoadEncoderSpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 
-#: Servo motors give three to three and a half times their rated torque for a moment.
+#: Servo motors produce three to three and a half times their rated torque for a short time.
 _PEAK_PER_RATED = 3.5
 
 
@@ -29,7 +29,7 @@ class _Finite(_Part):
 
 
 class MotorSpec(_Finite):
-    """The motor: rotor inertia and the rating that torque in ‰ refers to."""
+    """The motor: rotor inertia and the rating to which torque in ‰ refers."""
 
     inertia_kgm2: float = Field(gt=0)
     rated_torque_nm: float = Field(gt=0)
@@ -55,11 +55,11 @@ class MotorSpec(_Finite):
 class FrictionSpec(_Finite):
     """Friction at the motor shaft, and torques on the last inertia of the chain.
 
-    Friction begins at ``static_nm``, where that is more than ``coulomb_nm``, and falls to it within
-    ``stribeck_rad_s`` (Stribeck's curve): by exp(-(ω/ω_s)²), or by 1 - tanh(ω/ω_s) where
-    ``stribeck_law`` is "tanh". The motor holds the load with ``+gravity_nm``: the load
-    itself pulls to negative positions. ``fan_nms2`` grows with the square of the speed, as the
-    torque of a fan, a pump or a stirrer does.
+    Friction begins at ``static_nm``, if that is more than ``coulomb_nm``, and falls to it within
+    ``stribeck_rad_s`` (Stribeck's curve): by exp(-(ω/ω_s)²), or by 1 - tanh(ω/ω_s) if
+    ``stribeck_law`` is "tanh". The motor holds the load with ``+gravity_nm``: the load itself pulls
+    to negative positions. ``fan_nms2`` grows with the square of the speed, as the torque of a fan,
+    a pump or a stirrer does.
     """
 
     viscous_nms: float = Field(default=0.0, ge=0)
@@ -75,12 +75,12 @@ class FrictionSpec(_Finite):
 
 
 class PlaceSpec(_Finite):
-    """A torque that depends on the place of the last inertia, as the motor has to make it:
-    ``torque_nm`` · sin(2π (place − ``at_rev``) / ``period_rev``), places in motor revolutions.
+    """A torque that depends on the position of the last inertia, signed as required of the motor.
 
-    A period of one revolution is a load out of balance on the shaft, a longer one an arm behind a
-    gear, and one far longer than the travel a spring of 2π · ``torque_nm`` / ``period_rev`` per
-    revolution.
+    ``torque_nm`` · sin(2π (position − ``at_rev``) / ``period_rev``), positions in motor
+    revolutions. A period of one revolution is a load out of balance on the shaft, a longer one an
+    arm behind a gear, and one far longer than the travel a spring of 2π · ``torque_nm`` /
+    ``period_rev`` per revolution.
     """
 
     torque_nm: float = 0.0
@@ -89,7 +89,7 @@ class PlaceSpec(_Finite):
 
 
 class RippleSpec(_Finite):
-    """Periodic torque of the motor itself, as the motor has to make it, by its angle θ in rad.
+    """Periodic torque of the motor itself, signed as required of the motor, by its angle θ [rad].
 
     ``revolution_nm`` sin(θ + φ) of a bearing or a coupling, ``pole_pair_nm`` sin(pθ + φ) of a
     current offset with p ``pole_pairs``, and cogging of two harmonics, ``cogging_nm`` sin(cθ + φ)
@@ -108,9 +108,9 @@ class RippleSpec(_Finite):
 class EncoderSpec(_Finite):
     """Motor encoder; noise is the standard deviation of white Gaussian noise in counts.
 
-    As it is connected wrongly: ``inverted`` counts backwards, and ``counted_share`` of the
-    ``counts_per_rev`` arrives per revolution of the shaft. A motor that commutates by it then has a
-    field that runs away from its rotor.
+    Wrong connections: ``inverted`` counts backwards, and ``counted_share`` of the
+    ``counts_per_rev`` arrives per revolution of the shaft. The field of a motor commutated by it
+    then runs away from its rotor.
     """
 
     counts_per_rev: int = Field(default=2**23, ge=16)
@@ -120,13 +120,12 @@ class EncoderSpec(_Finite):
 
 
 class PhaseSpec(_Finite):
-    """How the motor's phases are connected, and by what the drive commutates.
+    """Connection of the motor's phases, and the source of the commutation angle.
 
-    "exchanged": two phases; the field turns against the rotor, and the torque of a constant
-    current is -cos(2pθ - ``angle_deg``) of what it should be. "shifted": all three by one place,
-    120° electrical; the torque is -0.5 of it. ``angle_deg`` is an error of the commutation
-    angle, electrical. With "hall" the rotor's angle comes from a sensor of its own, not from the
-    encoder.
+    "exchanged": two phases; the field turns against the rotor, and the torque of a constant current
+    is -cos(2pθ - ``angle_deg``) of its correct value. "shifted": all three by one place, 120°
+    electrical; the torque is -0.5 of it. ``angle_deg`` is an error of the commutation angle,
+    electrical. With "hall" the rotor's angle comes from a separate sensor, not from the encoder.
     """
 
     order: Literal["right", "exchanged", "shifted"] = "right"
@@ -136,7 +135,7 @@ class PhaseSpec(_Finite):
 
     @property
     def wrong(self) -> bool:
-        """Whether the torque is not that of the current."""
+        """Whether the torque does not correspond to the current."""
         return self.order != "right" or self.angle_deg != 0.0
 
 
@@ -159,9 +158,9 @@ class TravelSpec(_Part):
 class SwitchSpec(_Part):
     """Positions of the switches, in motor revolutions from the start position.
 
-    Limit switches default to 0.25 revolutions before the end stops, or to a tenth of the travel
-    where it is short. The home switch is a cam
-    that is active from ``home_from_rev`` to ``home_to_rev``; either end may be infinite.
+    Limit switches default to 0.25 revolutions before the end stops, or to a tenth of a short
+    travel. The home switch is a cam that is active from ``home_from_rev`` to ``home_to_rev``;
+    either end may be infinite.
     """
 
     negative_limit_rev: float | None = None
@@ -200,7 +199,7 @@ class SupplySpec(_Finite):
 
 
 class LoadSpec(_Finite):
-    """One more inertia, hung on the one before by a spring with damping and maybe backlash.
+    """A further inertia, coupled to the one before by a spring with damping and optional backlash.
 
     ``backlash_rad`` is the whole width of the gap.
     """
@@ -212,7 +211,7 @@ class LoadSpec(_Finite):
 
 
 class MechanicsSpec(_Part):
-    """A motor, what hangs on it, and what it hangs on."""
+    """A motor, its load and its mounting."""
 
     motor: MotorSpec
     friction: FrictionSpec = FrictionSpec()
@@ -271,7 +270,7 @@ class MechanicsSpec(_Part):
 
     @property
     def total_inertia_kgm2(self) -> float:
-        """Motor and all loads, as seen below the first resonance."""
+        """Inertia of motor and all loads, effective below the first resonance."""
         return self.motor.inertia_kgm2 + sum(load.inertia_kgm2 for load in self.load)
 
     @property
@@ -296,7 +295,7 @@ def load_mechanics(path: Path) -> MechanicsSpec:
 
 
 def standard_mechanics() -> MechanicsSpec:
-    """A 400 W motor with a rigid load of twice its inertia and a little friction."""
+    """Return a 400 W motor with a rigid load of twice its inertia and a little friction."""
     return MechanicsSpec(
         motor=MotorSpec(inertia_kgm2=5e-5, rated_torque_nm=1.27, rated_speed_rpm=3000),
         friction=FrictionSpec(viscous_nms=2e-4, coulomb_nm=0.03),

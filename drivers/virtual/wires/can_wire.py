@@ -1,6 +1,6 @@
-"""Moves frames between virtual CANopen nodes and a client, over python-can or an slcan adapter.
+"""Transfers frames between virtual CANopen nodes and a client, over python-can or slcan.
 
-`CanWire` owns one thread. On request it lets every frame take the time it takes on a real bus.
+`CanWire` owns one thread. Optionally every frame takes its time on a real bus.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ _LONGEST_WAIT_S = 0.002
 
 
 class ClientSide(Protocol):
-    """Where the client's frames come from and the nodes' frames go."""
+    """Source of the client's frames and destination of the nodes' frames."""
 
     def recv(self, timeout_s: float) -> Frame | None:
-        """The next frame, or None after ``timeout_s``."""
+        """Return the next frame, or None after ``timeout_s``."""
 
     def send(self, frame: Frame) -> None:
-        """A frame of a node; lost without a word when no client listens."""
+        """Send a frame of a node; lost silently if no client listens."""
 
     def bus_off(self) -> None:
-        """Make the client's adapter go bus-off until it is opened again."""
+        """Make the client's adapter bus-off until it is opened again."""
 
     def error(self, kind: int) -> None:
-        """A frame of the client failed: ``kind`` is a class of linux/can/error.h."""
+        """Report that a frame of the client failed: ``kind`` is a class of linux/can/error.h."""
 
     def close(self) -> None:
-        """Give everything back."""
+        """Release all resources."""
 
 
 class PythonCanSide:
@@ -88,7 +88,7 @@ class PythonCanSide:
 
 
 class CanWire:
-    """Runs ``nodes`` on one bus. With ``bitrate`` frames take their real time on the wire."""
+    """Runs ``nodes`` on one bus. With ``bitrate``, frames take their real time on the wire."""
 
     def __init__(
         self, side: ClientSide, nodes: Sequence[CanopenNode], bitrate: int | None = None
@@ -96,8 +96,9 @@ class CanWire:
         self.side = side
         self.nodes = list(nodes)
         self.broken: int | None = None
-        """No frame gets through, and each of the client's ends with an error of this class:
-        ERROR_ACKNOWLEDGE where nobody else is on the bus, ERROR_PROTOCOL at another bit rate."""
+        """No frame is transferred, and each of the client's ends with an error of this class:
+        ERROR_ACKNOWLEDGE without another node on the bus, ERROR_PROTOCOL at another bit rate.
+        """
         self._bitrate = bitrate
         self._free_s = 0.0
         self._stopping = threading.Event()
@@ -107,7 +108,7 @@ class CanWire:
     def start(self) -> None:
         """Start, and return when the nodes have sent their boot-up messages."""
         self._thread.start()
-        for _ in range(2):  # one piece of work per round, so a whole round lies between
+        for _ in range(2):  # one job per round, so a whole round lies between
             self.do(lambda: None)
 
     def stop(self) -> None:
@@ -117,7 +118,7 @@ class CanWire:
         self.side.close()
 
     def do(self, work: Callable[[], None]) -> None:
-        """Run ``work`` on the wire's thread, where alone nodes and drives may be touched."""
+        """Run ``work`` on the wire's thread, the only one that may access nodes and drives."""
         done = threading.Event()
 
         def run() -> None:
@@ -151,7 +152,7 @@ class CanWire:
             self._send_due()
 
     def _send_due(self) -> None:
-        # Frames of one node are heard by the others too, as on a real bus.
+        # Frames of one node are received by the others too, as on a real bus.
         ready = [(node, frame) for node in self.nodes for frame in node.due()]
         if self.broken is not None:
             return

@@ -1,9 +1,9 @@
-"""A virtual CANopen node: CiA 301 around a `Device`, without any I/O.
+"""A virtual CANopen node: CiA 301 around a `Device`, without I/O.
 
-`CanopenNode` takes frames and yields frames with the time at which they are due; a wire
-(`drivers.virtual.wires.can_wire`) moves them. Trouble is switched on by attributes and methods:
-``mute``, ``delay_answers``, ``reboot``, ``guard_repeats`` …; two nodes of one number are simply
-two nodes on one wire.
+`CanopenNode` takes frames and returns frames with their due times; a wire
+(`drivers.virtual.wires.can_wire`) transfers them. Faults are injected by attributes and methods:
+``mute``, ``delay_answers``, ``reboot``, ``guard_repeats`` …; a duplicate node number is two nodes
+on one wire.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ _STOPPED, _OPERATIONAL, _PREOPERATIONAL = 4, 5, 127
 _HEARTBEAT_LOST = 0x8130
 _PDO_TOO_SHORT = 0x8210
 _OWN_CONSTANTS = (0x1000, 0x1001, 0x1018)
-"""Device type, error register, identity: a node has them whatever its device leaves out."""
+"""Device type, error register, identity: present even where the device has no such objects."""
 _SERVO_DEVICE_TYPE = 0x00020192
 _HISTORY = 8
-#: Bits of the error register (CiA 301 clause 7.5.2.2): any error, and an error of communication.
+#: Bits of the error register (CiA 301 clause 7.5.2.2): generic and communication error.
 _COMMUNICATION_ERROR = 0x11
 
 
 class CanopenNode:
-    """One node. ``clock`` gives nanoseconds; one thread at a time may call it."""
+    """One node. ``clock`` returns nanoseconds; called by one thread at a time."""
 
     def __init__(
         self,
@@ -53,21 +53,21 @@ class CanopenNode:
     ) -> None:
         self.device = device
         self.lss = LssSlave(_identity(device), node_id)
-        """Node-ID 255 is none: the node takes part in nothing but these services."""
+        """With node-ID 255 (none) the node serves only LSS."""
         self.deaf = False
-        """At another bit rate than the bus."""
+        """Set to another bit rate than the bus: receives nothing."""
         self.state = _PREOPERATIONAL
         self.mute = False
-        """Takes everything in and says nothing."""
+        """Receives everything and sends nothing."""
         self.guard_repeats = False
-        """Answers guarding with the same toggle bit each time."""
+        """Answers node guarding with the same toggle bit each time."""
         self.stays_preoperational = False
-        """Does not obey NMT start."""
+        """Ignores NMT start."""
         self.deaf_to_sync = False
         self.silent_sdo = False
-        """Answers no SDO request, and all else goes on."""
+        """Answers no SDO request; everything else works."""
         self.refused: dict[int, int] = {}
-        """Abort codes with which writes of these objects (index) are refused."""
+        """Abort codes by object index: writes of these objects are refused."""
         self._clock = clock
         self._objects = self._objects_now()
         self._server = SdoServer(
@@ -88,23 +88,23 @@ class CanopenNode:
 
     @property
     def node_id(self) -> int:
-        """Its number now; 255 where it has none."""
+        """Present node-ID; 255 if it has none."""
         return self.lss.active_node
 
     def _objects_now(self) -> CommunicationObjects:
         return CommunicationObjects(self.device, min(self.node_id, 127))
 
     def delay_answers(self, seconds: float, count: int = 1) -> None:
-        """The next ``count`` SDO answers come that late, in order as from a slow drive."""
+        """Delay the next ``count`` SDO answers by ``seconds``; the order is kept."""
         self._delays += [round(seconds * 1e9)] * count
 
     def reboot(self) -> None:
-        """Restart as after a power cut: the drive too."""
+        """Restart node and drive as after a power cycle."""
         self.device.power_cycle()
         self._boot(self._clock())
 
     def take(self, frame: Frame) -> None:
-        """A frame from the bus."""
+        """Process a frame received from the bus."""
         now = self._clock()
         self._follow_power(now)
         if not self.device.powered:
@@ -132,7 +132,7 @@ class CanopenNode:
             self._take_pdo(frame, now)
 
     def due(self) -> list[Frame]:
-        """Frames whose time has come; also runs everything that depends on time alone."""
+        """Return the frames that are due; also run all time-dependent functions."""
         now = self._clock()
         self._follow_power(now)
         if not self.device.powered:
@@ -150,7 +150,7 @@ class CanopenNode:
         return [] if self.mute else ready
 
     def next_due_s(self, longest_s: float) -> float:
-        """Seconds until `due` has something that is already known, at most ``longest_s``."""
+        """Return the seconds until the next frame now queued is due, at most ``longest_s``."""
         if not self._outbox:
             return longest_s
         earliest = min(at for at, _ in self._outbox)
@@ -171,10 +171,10 @@ class CanopenNode:
         self._reset_communication(now)
 
     def _set_layers(self, data: bytes, now: int) -> None:
-        """A request of the layer setting services.
+        """Process an LSS request.
 
-        A node without node-ID that was given one starts when it is switched to waiting; another
-        node takes a new one with the next reset of its communication (CiA 305 clause 3.5).
+        A node without node-ID that was given one starts when it is switched to the waiting state;
+        any other node takes a new node-ID with the next reset communication (CiA 305 clause 3.5).
         """
         answer = self.lss.take(data)
         if answer is not None:
@@ -219,7 +219,7 @@ class CanopenNode:
 
     def _guard(self, now: int) -> None:
         if self._objects.heartbeat_ms:
-            # One node uses one of the two, and the heartbeat counts (CiA 301 clause 7.2.8.2.2).
+            # A node uses one of the two, and heartbeat has priority (CiA 301 clause 7.2.8.2.2).
             return
         self._say(
             frames.HEARTBEAT + self.node_id, bytes([self.state | self._guard_toggle << 7]), now
@@ -230,7 +230,7 @@ class CanopenNode:
     def _beat(self, now: int) -> None:
         period = self._objects.heartbeat_ms * 1_000_000
         if self._objects.take_heartbeat_change():
-            # A period that was written counts from now, whatever was due before.
+            # A newly written period starts now.
             self._heartbeat_due_ns = now
         if period and now >= self._heartbeat_due_ns:
             self._heartbeat_due_ns += period * (1 + (now - self._heartbeat_due_ns) // period)
@@ -250,7 +250,7 @@ class CanopenNode:
         if not answers or self.silent_sdo:
             return
         delay = self._delays.pop(0) if self._delays else 0
-        # A drive answers in order: nothing overtakes a late answer.
+        # A drive answers in order: no answer overtakes a delayed one.
         self._answers_due_ns = max(self._answers_due_ns, now + delay)
         for data in answers:
             self._say(frames.SDO_ANSWER + self.node_id, data, self._answers_due_ns)
@@ -267,12 +267,12 @@ class CanopenNode:
                 raise
             return self._standard(index, subindex, refusal)
         if (index, subindex) == (0x1000, 0) and not any(value):
-            # Manuals print no value for the device type; a drive has one nevertheless.
+            # Manuals list no value for the device type, but drives have one.
             return struct.pack("<I", _SERVO_DEVICE_TYPE)
         return value
 
     def _standard(self, index: int, subindex: int, refusal: SdoAbort) -> bytes:
-        """What every node has, for drives whose dictionary leaves it out."""
+        """Return mandatory objects of CiA 301 that the drive's dictionary does not contain."""
         identity = self.device.profile.identity
         if (index, subindex) == (0x1000, 0):
             return struct.pack("<I", _SERVO_DEVICE_TYPE)
@@ -289,7 +289,7 @@ class CanopenNode:
         raise refusal
 
     def _past_error(self, subindex: int) -> bytes:
-        """1003h; an entry that holds no error is no data (CiA 301 clause 7.5.2.4)."""
+        """Return 1003h; an empty entry aborts with "no data" (CiA 301 clause 7.5.2.4)."""
         if subindex == 0:
             return bytes([len(self._history)])
         if subindex > _HISTORY:
@@ -309,7 +309,7 @@ class CanopenNode:
             if subindex:
                 raise SdoAbort(ABORT_READ_ONLY)
             if data != b"\0":
-                # Only 0, which empties the list, may be written.
+                # Only 0 may be written; it clears the list.
                 raise SdoAbort(ABORT_VALUE_RANGE if len(data) == 1 else ABORT_LENGTH)
             self._history.clear()
         elif index in _OWN_CONSTANTS and index not in self.device.indices():
@@ -319,7 +319,7 @@ class CanopenNode:
             self.device.write(index, subindex, data)
 
     def _size(self, index: int, subindex: int) -> int | None:
-        """Bytes of an object whose type has a fixed length, for writes without a length."""
+        """Return the bytes of an object with fixed length, for writes without a length."""
         if self._objects.owns(index):
             return len(self._objects.read(index, subindex))
         try:
@@ -334,7 +334,7 @@ class CanopenNode:
             self._emergency(code, register, extra, now)
 
     def _error_register(self) -> int:
-        """1001h: the drive's errors, where it has the object, and those of the network."""
+        """Return 1001h: the drive's errors, if it has the object, plus network errors."""
         try:
             register = self.device.read(0x1001, 0)[0]
         except SdoAbort:
@@ -342,13 +342,13 @@ class CanopenNode:
         return register | (_COMMUNICATION_ERROR if self._own_errors else 0)
 
     def _raise_own(self, code: int, now: int) -> None:
-        """A network error, reported once while it lasts (CiA 301 clause 7.2.7.1)."""
+        """Send a network error once while it is present (CiA 301 clause 7.2.7.1)."""
         if code not in self._own_errors:
             self._own_errors.add(code)
             self._emergency(code, self._error_register(), bytes(5), now)
 
     def _clear_own(self, code: int, now: int) -> None:
-        """It is over: reported with code 0 and what the register still holds."""
+        """Report the end of a network error: code 0 and the remaining error register."""
         if code in self._own_errors:
             self._own_errors.discard(code)
             self._emergency(0, self._error_register(), bytes(5), now)
@@ -385,7 +385,7 @@ class CanopenNode:
         if self.state != _OPERATIONAL:
             return
         self._syncs += 1
-        # Inputs are what was true at this SYNC, before the outputs of the last cycle act.
+        # Inputs are sampled at this SYNC, before the outputs of the last cycle are applied.
         for pdo in self._of("tx"):
             if pdo.kind == 0:
                 self._send_if_changed(pdo, now)
@@ -429,7 +429,7 @@ class CanopenNode:
 
 
 def _identity(device: Device) -> LssIdentity:
-    """1018h, or what the profile says where the device has no such object."""
+    """Return 1018h, or the profile's identity if the device has no such object."""
     own = device.profile.identity
     stated = (own.vendor_id, own.product_code, own.revision, 0)
     parts = []

@@ -1,4 +1,4 @@
-"""Communication objects of a virtual CANopen node (1005h … 1A03h), and its PDOs.
+"""Communication objects (1005h … 1A03h) and PDOs of a virtual CANopen node.
 
 Source: CiA 301 v4.2.0 clause 7.5.2.
 """
@@ -27,7 +27,7 @@ _IDENTIFIER = 0x7FF
 _NO_REMOTE = 0x40000000
 _GENERATES_SYNC = 0x40000000
 _EXTENDED = 0x20000000
-#: Identifiers that belong to other services (CiA 301 table 40).
+#: COB-IDs reserved for other services (CiA 301 table 40).
 _RESTRICTED = (
     range(0x001), range(0x001, 0x080), range(0x101, 0x181), range(0x581, 0x600),
     range(0x601, 0x680), range(0x6E0, 0x700), range(0x701, 0x780), range(0x780, 0x800),
@@ -37,7 +37,7 @@ _ENTRIES = 8
 
 @dataclass(slots=True)
 class Pdo:
-    """One PDO of the node as its objects describe it."""
+    """One PDO as its communication and mapping objects describe it."""
 
     direction: Literal["rx", "tx"]
     number: int
@@ -53,12 +53,12 @@ class Pdo:
 
     @property
     def valid(self) -> bool:
-        """Exchanged at all."""
+        """Whether the PDO is exchanged (valid bit of the COB-ID)."""
         return not self.cob_id & INVALID
 
     @property
     def answers_remote(self) -> bool:
-        """A remote frame with its identifier is answered (bit 30 of the COB-ID is 0)."""
+        """Whether a remote frame with its COB-ID is answered (bit 30 of the COB-ID is 0)."""
         return not self.cob_id & _NO_REMOTE
 
     @property
@@ -68,14 +68,14 @@ class Pdo:
 
 
 class CommunicationObjects:
-    """Read and write access to what belongs to the node and not to the drive behind it."""
+    """Read and write access to the communication objects, which the drive does not have."""
 
     def __init__(self, device: Device, node_id: int) -> None:
         self._device = device
         self._node_id = node_id
         link = device.profile.link("canopen")
         self.offers_consumer = link is None or link.watchdog.present
-        """A family whose manual names no watchdog has no heartbeat consumer either (DS_C)."""
+        """Families whose manual describes no watchdog have no heartbeat consumer either (DS_C)."""
         self.heartbeat_ms = 0
         self._heartbeat_changed = False
         self.consumer = 0
@@ -84,7 +84,7 @@ class CommunicationObjects:
         self.reset()
 
     def reset(self) -> None:
-        """Power-on values."""
+        """Set the power-on values."""
         self.heartbeat_ms = 0
         self.consumer = 0
         self.sync_cob = 0x80
@@ -117,7 +117,7 @@ class CommunicationObjects:
         return index << 16 | subindex << 8 | bits
 
     def owns(self, index: int) -> bool:
-        """Whether ``index`` is served here rather than by the drive."""
+        """Whether ``index`` is served here and not by the drive."""
         if index == 0x1016:
             return self.offers_consumer
         return index in (0x1005, 0x1014, 0x1017, 0x1200) or (
@@ -125,7 +125,7 @@ class CommunicationObjects:
         )
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of an object. Raises SdoAbort."""
+        """Return the value of an object. Raises SdoAbort."""
         plain = {
             (0x1005, 0): struct.pack("<I", self.sync_cob),
             (0x1014, 0): struct.pack("<I", 0x80 + self._node_id),
@@ -144,7 +144,7 @@ class CommunicationObjects:
         return self._read_mapping(pdo, subindex) if index & 0x200 else _read_pdo(pdo, subindex)
 
     def take_heartbeat_change(self) -> bool:
-        """Whether 1017h was written since the last call."""
+        """Return whether 1017h was written since the last call."""
         changed, self._heartbeat_changed = self._heartbeat_changed, False
         return changed
 
@@ -156,7 +156,7 @@ class CommunicationObjects:
         return struct.pack("<I", pdo.entries[subindex - 1])
 
     def write(self, index: int, subindex: int, data: bytes) -> None:
-        """Write an object. Raises SdoAbort with nothing changed."""
+        """Write an object. Raises SdoAbort; nothing is changed then."""
         if (index, subindex) == (0x1017, 0):
             self.heartbeat_ms = _number(data, 2)
             self._heartbeat_changed = True
@@ -193,7 +193,7 @@ class CommunicationObjects:
         elif subindex == 3 and pdo.direction == "tx":
             inhibit_100us = _number(data, 2)
             if pdo.valid:
-                # CiA 301 clause 7.5.2.37: not to be changed while the PDO exists.
+                # CiA 301 clause 7.5.2.37: cannot be changed while the PDO is valid.
                 raise SdoAbort(ABORT_DEVICE_STATE)
             pdo.inhibit_100us = inhibit_100us
         elif subindex == 5:
@@ -247,13 +247,13 @@ def _read_pdo(pdo: Pdo, subindex: int) -> bytes:
 
 
 def _check_identifier(cob_id: int) -> None:
-    """Refuse identifiers of other services and 29-bit ones, which this node does not have."""
+    """Refuse COB-IDs of other services and 29-bit identifiers, which are not supported."""
     if cob_id & _EXTENDED or any(cob_id & _IDENTIFIER in taken for taken in _RESTRICTED):
         raise SdoAbort(ABORT_VALUE_RANGE)
 
 
 def _sync_identifier(cob_id: int) -> int:
-    """1005h: this node takes SYNC and cannot send it (CiA 301 clause 7.5.2.5)."""
+    """Check 1005h: this node consumes SYNC and cannot produce it (CiA 301 clause 7.5.2.5)."""
     if cob_id & _GENERATES_SYNC:
         raise SdoAbort(ABORT_VALUE_RANGE)
     _check_identifier(cob_id)

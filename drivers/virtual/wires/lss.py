@@ -1,4 +1,4 @@
-"""A slave of the layer setting services (CiA 305), without I/O: frames in, answers out."""
+"""A slave of the layer setting services (CiA 305), without I/O: takes frames, returns answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _FIRST_ERROR = 1
 
 
 class LssSlave:
-    """States and pending values. ``node_id`` 255 is none; what is stored survives power cycles."""
+    """States and pending values. ``node_id`` 255 is none; stored values survive power cycles."""
 
     def __init__(self, identity: LssIdentity, node_id: int, rate_index: int | None = None) -> None:
         self.identity = identity
@@ -27,17 +27,17 @@ class LssSlave:
 
     @property
     def unconfigured(self) -> bool:
-        """Without a node-ID it does nothing but this."""
+        """Whether it has no node-ID and therefore serves only LSS."""
         return self.active_node == codes.NO_NODE_ID
 
     def power_on(self) -> None:
-        """What was stored counts."""
+        """Activate the stored values."""
         self.pending_node = self.active_node = self.stored_node
         self.pending_rate = self.active_rate = self.stored_rate
         self._configuring, self._matched, self._position = False, 0, 0
 
     def take(self, data: bytes) -> bytes | None:
-        """A request; the answer if there is one."""
+        """Process a request; return the answer, if any."""
         if len(data) != 8:
             return None
         command = data[0]

@@ -1,4 +1,4 @@
-"""Virtual drives as Modbus RTU slaves on a pty, for Modbus and MLink families alike."""
+"""Virtual drives as Modbus RTU slaves on a pty, for Modbus and MLink families."""
 
 from __future__ import annotations
 
@@ -53,24 +53,24 @@ _EXCEPTION_OF_ABORT = {
     ABORT_TOO_HIGH: _ILLEGAL_DATA,
     ABORT_TOO_LOW: _ILLEGAL_DATA,
 }
-#: Physics go on at least this often while nobody asks.
+#: Longest interval between updates of the physics without requests.
 _TICK_S = 0.005
-#: A started request that pauses this long is over. Generous: a pty has no bit times.
+#: A pause of this length ends a request. Generous: a pty has no bit times.
 _FRAME_GAP_S = 0.005
 
 
 class Registers(Protocol):
-    """A drive's registers. Both methods raise SdoAbort and change nothing then."""
+    """Registers of a drive. Both methods raise SdoAbort and then change nothing."""
 
     def read(self, start: int, count: int) -> Sequence[int]:
-        """Values of ``count`` registers."""
+        """Return the values of ``count`` registers."""
 
     def write(self, start: int, values: Sequence[int]) -> None:
         """Write registers."""
 
 
 class TableRegisters:
-    """A family with a register table of its own."""
+    """A family with its own register table."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
@@ -85,11 +85,11 @@ class TableRegisters:
 
 
 class ObjectRegisters:
-    """A family whose registers follow from the objects by MLink's rule.
+    """A family whose registers are derived from the objects by MLink's rule.
 
-    A request covers one object or several that follow each other without a hole; an object is
-    read or written as a whole. Where two objects have the same register, the lower index and
-    then subindex 1 rather than 0 answers.
+    A request covers one object or several consecutive ones without a gap; an object is read or
+    written as a whole. If two objects have the same register, the lower index has priority, then
+    subindex 1 over 0.
     """
 
     def __init__(self, device: Device) -> None:
@@ -135,7 +135,7 @@ class ObjectRegisters:
         return words
 
     def write(self, start: int, values: Sequence[int]) -> None:
-        """See `Registers.write`. Of several objects, those before a refused one are written."""
+        """See `Registers.write`. Objects before a refused one are written."""
         for index, subindex, place in self._covered(start, len(values)):
             first = place.start - start
             words = values[first : first + place.count]
@@ -144,7 +144,7 @@ class ObjectRegisters:
 
 
 def _narrowed(place: Place, raw: bytes) -> bytes:
-    """Register bytes as the object's value; what does not fit 8 bits is out of range."""
+    """Return register bytes as the object's value; out of range if they do not fit 8 bits."""
     if size_of(place.type) == 1:
         value = int.from_bytes(raw, "big", signed=place.type == "INT8")
         low, high = (-128, 127) if place.type == "INT8" else (0, 255)
@@ -155,10 +155,10 @@ def _narrowed(place: Place, raw: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """What goes wrong with one answer.
+    """One fault injected into an answer.
 
     ``seconds`` is the delay of ``delay``; ``data`` the bytes of ``noise`` before the answer;
-    ``keep`` how many bytes of a truncated answer are sent; ``code`` the exception of ``refuse``.
+    ``keep`` the number of bytes sent of a truncated answer; ``code`` the exception of ``refuse``.
     """
 
     kind: Literal["drop", "delay", "truncate", "corrupt", "double", "noise", "refuse"]
@@ -171,9 +171,9 @@ class Trouble:
 class ModbusSlave:
     """A thread that answers for one or several drives on one wire.
 
-    ``stations`` maps addresses to ``(device, registers)``. ``lock`` is held around every call of
-    a device; give the same lock to the other wires of a device, and hold it for calls of your own.
-    ``client_baudrate`` makes the drives deaf to a client with another baud rate set.
+    ``stations`` maps addresses to ``(device, registers)``. ``lock`` is held during every call of a
+    device; use the same lock for the other wires of a device, and hold it for your own calls. With
+    ``client_baudrate`` the drives ignore a client that uses another baud rate.
     """
 
     def __init__(
@@ -190,7 +190,7 @@ class ModbusSlave:
         self.lock = lock or threading.RLock()
         self.mute = False
         self.mute_stations: set[int] = set()
-        """Of these the wire carries no answer; the others answer as ever."""
+        """Stations whose answers are not sent; the others answer normally."""
         self.echo = False
         self.requests = 0
         self._now_ns = now_ns
@@ -202,20 +202,20 @@ class ModbusSlave:
         self._thread = threading.Thread(target=self._serve, name=f"slave {wire.path}", daemon=True)
 
     def start(self) -> None:
-        """Make the wire and answer on it; returns when the first request would be answered."""
+        """Open the wire and answer requests; returns when requests can be answered."""
         self.wire.open()
         self._thread.start()
         self._serving.wait()
 
     def stop(self) -> None:
-        """End the thread and remove the wire."""
+        """Stop the thread and remove the wire."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
         self.wire.close()
 
     def trouble(self, *troubles: Trouble) -> None:
-        """Let the next answers go wrong, one trouble for each."""
+        """Inject faults into the next answers, one each."""
         self._troubles.extend(troubles)
 
     def _serve(self) -> None:
@@ -254,7 +254,7 @@ class ModbusSlave:
         self.requests += 1
         if self.mute or request.station in self.mute_stations:
             return
-        # A drive acts when the request has crossed the wire; its clock is set to that moment.
+        # A drive acts when the request is received; its clock is set to that time.
         ahead_ns = int((self.wire.arrival_s - time.monotonic()) * 1e9)
         self._advance(self._now_ns() + max(0, ahead_ns))
         with self.lock:
@@ -293,7 +293,7 @@ class ModbusSlave:
 
 
 def _execute(registers: Registers, request: Request) -> bytes:
-    """Carry out a request; returns the answer."""
+    """Execute a request and return the answer."""
     try:
         if request.function == READ:
             if not 1 <= request.count <= MAX_READ_REGISTERS:
@@ -301,7 +301,7 @@ def _execute(registers: Registers, request: Request) -> bytes:
             return read_response(request.station, registers.read(request.start, request.count))
         if request.function in (WRITE_ONE, WRITE_MANY):
             if not request.values:
-                # A whole frame whose count and length contradict each other or the standard.
+                # A complete frame whose count and length contradict each other or the standard.
                 return exception_response(request.station, request.function, _ILLEGAL_DATA)
             registers.write(request.start, request.values)
             return write_response(request)

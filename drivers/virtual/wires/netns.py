@@ -1,11 +1,11 @@
-"""Network namespaces for an ordinary user: virtual cables that nobody else can see.
+"""Network namespaces without root rights: virtual cables that other processes cannot see.
 
 A *holder* process creates a user and network namespace, makes veth pairs in it by netlink (no
-system package needed) and lives until its standard input closes. Other processes run inside by
+system package required) and runs until its standard input closes. Other processes run inside by
 `Namespace.command`, or join by `enter` while they still have a single thread.
 
-Run as a module it is the holder (``--hold PAIR…``) or joins and executes (``--join PID -- …``).
-It imports nothing heavy: a namespace can be changed only while there is one thread.
+Run as a module it is the holder (``--hold PAIR…``) or joins and executes (``--join PID -- …``). It
+imports only small modules: a namespace can be changed only while there is one thread.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ _KEEP_TIME = ("drivers.virtual.", "drivers.ethercat.process")
 
 
 class NamespaceUnavailable(Exception):
-    """The system forbids namespaces; the message says what failed and the ways to allow it."""
+    """The system forbids namespaces; the message states the cause and the remedies."""
 
 
 def unavailable() -> str | None:
-    """Why namespaces cannot be used here, in one sentence; None if they can."""
+    """Return why namespaces cannot be used, in one sentence; None if they can."""
     try:
         Namespace.create().close()
     except NamespaceUnavailable as error:
@@ -68,10 +68,10 @@ class Namespace:
 
     @classmethod
     def create(cls, pairs: Sequence[tuple[str, str]] = (("ec0m", "ec0s"),)) -> Namespace:
-        """Start a holder with these veth pairs, all up.
+        """Start a holder with these veth pairs, all switched on.
 
         Raises:
-            NamespaceUnavailable: with the reason and what would allow it.
+            NamespaceUnavailable: with the cause and the remedies.
         """
         if not AVAILABLE:
             raise NamespaceUnavailable("virtual EtherCAT cables need Linux network namespaces")
@@ -97,21 +97,21 @@ class Namespace:
 
     @property
     def pid(self) -> int:
-        """Process whose namespaces others join."""
+        """Process ID of the holder, whose namespaces others join."""
         return self._holder.pid
 
     def command(self, argv: Sequence[str]) -> list[str]:
-        """The command line that runs ``argv`` inside."""
+        """Return the command line that runs ``argv`` inside."""
         return [*_python(), "--join", str(self.pid), "--", *argv]
 
     def popen(self, argv: Sequence[str], **options: object) -> subprocess.Popen[str]:
-        """Start ``argv`` inside, with text pipes as the options of `subprocess.Popen` say."""
+        """Start ``argv`` inside, with text pipes according to the options of `subprocess.Popen`."""
         environment = child_environment()
         command = self.command(argv)
         return subprocess.Popen(command, text=True, env=environment, **options)  # type: ignore[call-overload, no-any-return]
 
     def close(self) -> None:
-        """End the holder; the namespace goes when its last process ends."""
+        """Stop the holder; the namespace is removed when its last process ends."""
         for stream in (self._holder.stdin, self._holder.stdout):
             if stream is not None:
                 with contextlib.suppress(OSError):
@@ -152,7 +152,7 @@ def _python() -> list[str]:
 
 
 def child_environment() -> dict[str, str]:
-    """Children find the package wherever they start."""
+    """Return an environment in which children find the package from any directory."""
     root = str(Path(__file__).resolve().parents[3])
     path = os.environ.get("PYTHONPATH")
     return {**os.environ, "PYTHONPATH": f"{root}:{path}" if path else root}
@@ -171,10 +171,10 @@ def _name(name: str) -> bytes:
 
 
 def _request(flags: int, body: bytes, what: str) -> None:
-    """One netlink request with its acknowledgement.
+    """Send one netlink request and wait for its acknowledgement.
 
     Raises:
-        OSError: the kernel's refusal, naming ``what``.
+        OSError: refused by the kernel; names ``what``.
     """
     header = struct.pack("<IHHII", 16 + len(body), _RTM_NEWLINK, _REQUEST | _ACK | flags, 1, 0)
     with socket.socket(AF_NETLINK, socket.SOCK_RAW, NETLINK_ROUTE) as netlink:
@@ -186,7 +186,7 @@ def _request(flags: int, body: bytes, what: str) -> None:
 
 
 def create_veth(first: str, second: str) -> None:
-    """A pair of interfaces, each the other end of the same cable."""
+    """Create a pair of interfaces, the two ends of one cable."""
     peer = _attribute(_VETH_PEER | _NESTED, bytes(16) + _name(second))
     info = _attribute(_INFO_KIND, b"veth") + _attribute(_INFO_DATA | _NESTED, peer)
     body = bytes(16) + _name(first) + _attribute(_IFLA_LINKINFO | _NESTED, info)
@@ -201,9 +201,9 @@ def set_up(name: str, up: bool = True) -> None:
 
 
 def silence(name: str) -> None:
-    """No IPv6 addresses, so that nothing but our frames is on the cable.
+    """Disable IPv6 addresses, so that only our frames are on the cable.
 
-    A kernel without IPv6 refuses, which is as good.
+    A kernel without IPv6 refuses this, which has the same effect.
     """
     index = socket.if_nametoindex(name)
     head = struct.pack("<BxHiII", socket.AF_UNSPEC, 0, index, 0, 0)
@@ -235,10 +235,10 @@ def _hold(names: Sequence[str]) -> int:
 
 
 def _keeps_time(argv: Sequence[str]) -> bool:
-    """Whether a command stands for hardware, or is the master next to it, by the time of the clock.
+    """Whether a command is virtual hardware or its master, running in real time.
 
-    Where time follows the frames, priority would only let setpoints expire while who renews them
-    waits for the processor. A server or a recorder would keep all others waiting.
+    If time follows the frames, priority would only let setpoints expire while the process that
+    renews them waits for the processor. A server or a recorder would block all others.
     """
     return "--lockstep" not in argv and any(word.startswith(_KEEP_TIME) for word in argv)
 
@@ -247,7 +247,7 @@ def _main(argv: Sequence[str]) -> int:
     if argv[:1] == ["--hold"]:
         return _hold(argv[1:])
     if len(argv) > 3 and argv[0] == "--join" and argv[2] == "--":
-        # Inside, nobody may ask for it any more.
+        # Inside the namespace, priority cannot be requested any more.
         if _keeps_time(argv):
             scheduling.virtual_priority()
         try:

@@ -1,8 +1,8 @@
-"""A pseudo-terminal at a path of our choice: the cable of virtual serial drives.
+"""A pseudo-terminal at a given path: the cable of virtual serial drives.
 
-A client opens the path like a serial port. The bytes are real; bit times, parity and modem lines
-do not exist on a pty, so wire time is emulated on request: a frame counts as arrived only when
-its last bit would have been.
+A client opens the path like a serial port. The bytes are real; a pty has no bit times, parity or
+modem lines, so wire time is emulated on request: a frame counts as received only at the time of its
+last bit.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from drivers.modbus.timing import sleep_precisely
 
 @dataclass(frozen=True, slots=True)
 class WireTime:
-    """Speed of an emulated wire. ``turnaround_s`` is what the drive takes before it answers."""
+    """Speed of an emulated wire. ``turnaround_s`` is the drive's time before it answers."""
 
     baudrate: int
     bits_per_char: int = 10
@@ -35,17 +35,17 @@ class WireTime:
 
     @property
     def char_s(self) -> float:
-        """Time of one character."""
+        """Duration of one character."""
         return self.bits_per_char / self.baudrate
 
 
 def open_pty(path: Path) -> tuple[int, int]:
-    """A raw pty whose slave end appears at ``path``: its master, which never blocks, and slave.
+    """Create a raw pty whose slave end appears at ``path``; return master (non-blocking) and slave.
 
-    The slave end is to stay open: without any, reading the master fails while no client is there.
+    The slave end must stay open: otherwise reading the master fails while there is no client.
 
     Raises:
-        LinkLost: something that is not a wire of ours is already at the path.
+        LinkLost: the path exists and is not a virtual wire.
         NotAllowed: the system has no pseudo-terminals (Windows).
     """
     require_pseudo_terminals()
@@ -58,14 +58,14 @@ def open_pty(path: Path) -> tuple[int, int]:
     fresh = path.with_name(f".{path.name}.{os.getpid()}")
     fresh.unlink(missing_ok=True)
     fresh.symlink_to(terminal_name(slave))
-    fresh.replace(path)  # at once: a client never sees half a wire
+    fresh.replace(path)  # atomic: a client never sees an incomplete link
     return master, slave
 
 
 def close_pty(path: Path, master: int, slave: int) -> None:
-    """Close both ends of `open_pty` and take the link away.
+    """Close both ends of `open_pty` and remove the link.
 
-    A wire that was made later at the same path is not ours to remove.
+    A newer wire at the same path is not removed.
     """
     if path.is_symlink() and str(path.readlink()) == terminal_name(slave):
         path.unlink()
@@ -76,8 +76,8 @@ def close_pty(path: Path, master: int, slave: int) -> None:
 class PtyWire:
     """A pty whose slave end appears at ``path``.
 
-    One thread reads and writes; `pull` and `heal` may come from any other. While the wire
-    keeps the slave end open itself, clients may come and go.
+    One thread reads and writes; `pull` and `heal` may be called from any other. The wire itself
+    keeps the slave end open, so clients may connect and disconnect.
     """
 
     def __init__(self, path: str | Path, wire_time: WireTime | None = None) -> None:
@@ -93,7 +93,7 @@ class PtyWire:
         """Create the pty and the link to it.
 
         Raises:
-            LinkLost: something that is not a wire of ours is already at the path.
+            LinkLost: the path exists and is not a virtual wire.
         """
         with self._lock:
             if self._master >= 0:
@@ -101,8 +101,8 @@ class PtyWire:
             self._master, self._slave = open_pty(self.path)
 
     def close(self) -> None:
-        """Remove the wire. Clients that have it open see an adapter that is gone."""
-        self._closing = True  # the reading thread lets go of the lock
+        """Remove the wire. Clients that have it open see a missing adapter."""
+        self._closing = True  # the reading thread releases the lock
         with self._lock:
             self._closing = False
             if self._master < 0:
@@ -111,32 +111,31 @@ class PtyWire:
             self._master = self._slave = -1
 
     def pull(self) -> None:
-        """Pull the cable: the same as closing, until `heal`."""
+        """Disconnect the cable: the same as closing, until `heal`."""
         self.close()
 
     def heal(self) -> None:
-        """Put the cable back."""
+        """Connect the cable again."""
         self.open()
 
     @property
     def is_open(self) -> bool:
-        """False while pulled."""
+        """False while disconnected."""
         return self._master >= 0
 
     def client_baudrate(self) -> int | None:
-        """Baud rate that the client has set, or None if this system has no name for it."""
+        """Return the client's baud rate, or None if this system has no name for it."""
         return output_speed(self._master)
 
     def read(self, timeout_s: float) -> bytes:
-        """Bytes from the client, at once; empty after ``timeout_s`` without any.
+        """Return bytes from the client at once; empty after ``timeout_s`` without any.
 
-        With wire time the bytes are still on the wire when they are returned: `arrival_s`
-        says until when.
+        With wire time the returned bytes are still on the wire until `arrival_s`.
         """
         if self._closing or self._master < 0:
             time.sleep(min(timeout_s, 0.002))
             return b""
-        # The lock keeps the descriptor ours: a closed number may be somebody else's socket next.
+        # The lock protects the descriptor: after closing, its number may belong to another socket.
         with self._lock:
             if self._master < 0 or not select.select([self._master], [], [], timeout_s)[0]:
                 return b""
@@ -151,11 +150,11 @@ class PtyWire:
 
     @property
     def arrival_s(self) -> float:
-        """Monotonic time at which the last byte read has (or will have) crossed the wire."""
+        """Monotonic time at which the last byte read has crossed (or will cross) the wire."""
         return max(self._busy_until_s, time.monotonic()) if self.wire_time else time.monotonic()
 
     def write(self, data: bytes) -> None:
-        """Send to the client; with wire time, when the last bit has arrived there."""
+        """Send to the client; with wire time, return when the last bit has arrived."""
         if self.wire_time is not None:
             start = max(time.monotonic(), self._busy_until_s + self.wire_time.turnaround_s)
             self._busy_until_s = start + len(data) * self.wire_time.char_s
@@ -165,4 +164,4 @@ class PtyWire:
                 while data and self._master >= 0:
                     data = data[os.write(self._master, data) :]
             except BlockingIOError:
-                return  # nobody reads: the bytes are lost, as on a real wire
+                return  # no reader: the bytes are lost, as on a real wire

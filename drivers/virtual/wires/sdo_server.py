@@ -1,4 +1,4 @@
-"""The server's side of SDO transfers: expedited, segmented and block, without any I/O.
+"""The server side of SDO transfers: expedited, segmented and block, without I/O.
 
 Source: CiA 301 v4.2.0 clause 7.2.4.3.
 """
@@ -26,7 +26,7 @@ _LONGEST = 1 << 20
 
 @dataclass(slots=True)
 class _Transfer:
-    """What is under way: ``kind`` is one of the states named in `SdoServer`."""
+    """Transfer in progress: ``kind`` is one of the states named in `SdoServer`."""
 
     kind: str
     mux: bytes
@@ -43,7 +43,7 @@ class _Transfer:
 class SdoServer:
     """Answers request frames. ``read`` and ``write`` take (index, subindex[, data]).
 
-    ``size`` shows an object's bytes where its type fixes them: a write may leave its length open.
+    ``size`` returns an object's bytes if its type has a fixed length: a write may then omit it.
     """
 
     def __init__(
@@ -61,11 +61,11 @@ class SdoServer:
         self._transfer: _Transfer | None = None
 
     def reset(self) -> None:
-        """Communication starts again: a transfer under way is over."""
+        """Reset communication: discard a transfer in progress."""
         self._transfer = None
 
     def request(self, frame: bytes) -> list[bytes]:
-        """All frames that answer ``frame``; often one, in a block up to 127, or none."""
+        """Return all frames that answer ``frame``: usually one, up to 127 in a block, or none."""
         if len(frame) != 8:
             return []
         if frame[0] == 0x80:
@@ -130,7 +130,7 @@ class SdoServer:
         return [b"\x60" + mux + bytes(4)]
 
     def _open_size(self, mux: bytes) -> int:
-        """How much of an expedited write without a length is meant: what the object takes."""
+        """Return the length of an expedited write without one: the object's length."""
         known = self._size(*_object(mux)) if self._size is not None else None
         return 4 if known is None else min(known, 4)
 
@@ -227,7 +227,7 @@ class SdoServer:
 
 
 def _opens(command: int, under_way: _Transfer) -> bool:
-    """Whether a request names its own object, so that its refusal is about that one."""
+    """Whether a request names an object, so that an abort refers to that object."""
     if under_way.kind == "block_download":
         # A segment of the block: its first byte is a number.
         return False

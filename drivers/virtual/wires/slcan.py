@@ -1,6 +1,6 @@
 """A virtual slcan adapter on a pty, for python-can's slcan client and others.
 
-Source: Lawicel CAN232 manual V3 (commands S, O, C, L, t, r, F, V, N; CR for done, BEL for not).
+Source: Lawicel CAN232 manual V3 (commands S, O, C, L, t, r, F, V, N; CR for OK, BEL for error).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class SlcanSide:
     """The adapter. ``path`` becomes a symbolic link to the pty.
 
     Raises:
-        LinkLost: something that is not a link is already at the path.
+        LinkLost: the path exists and is not a link.
     """
 
     def __init__(self, path: Path) -> None:
@@ -43,11 +43,11 @@ class SlcanSide:
         self._plug()
 
     def plug(self) -> None:
-        """Plug the adapter in again, at the same path."""
+        """Connect the adapter again, at the same path."""
         self._wanted.put(self._plug)
 
     def unplug(self) -> None:
-        """Pull the adapter: the client's descriptor goes dead."""
+        """Disconnect the adapter: the client's descriptor becomes invalid."""
         self._wanted.put(self._unplug)
 
     def _plug(self) -> None:
@@ -69,7 +69,7 @@ class SlcanSide:
         self._bus_off = True
 
     def error(self, kind: int) -> None:
-        """Go error passive with a full buffer: of the kind this adapter reports nothing."""
+        """Become error passive with a full buffer; this adapter does not report ``kind``."""
         del kind
         self._passive = True
 
@@ -78,7 +78,7 @@ class SlcanSide:
         self._unplug()
 
     def recv(self, timeout_s: float) -> Frame | None:
-        """The client's next frame, or None after ``timeout_s``."""
+        """Return the client's next frame, or None after ``timeout_s``."""
         while not self._wanted.empty():
             self._wanted.get()()
         if self._frames:
@@ -97,7 +97,7 @@ class SlcanSide:
         return self._frames.popleft() if self._frames else None
 
     def send(self, frame: Frame) -> None:
-        """A frame for the client; dropped when the channel is closed or the client is slow."""
+        """Send a frame to the client; lost if the channel is closed or the client is slow."""
         if not self._opened or self._bus_off:
             return
         letter = "r" if frame.remote else "t"

@@ -1,1 +1,1 @@
-"""What families of CiA 402 drives share: their seam, gains, notches, terminals, protections."""
+"""Common parts of CiA 402 families: interface, gains, notches, terminals, protections."""

@@ -1,4 +1,4 @@
-"""The seam between the CiA 402 firmware and one drive family."""
+"""The interface between the CiA 402 firmware and one drive family."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _NO_TIME_MS = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Units:
-    """User units per SI unit; the signs carry the polarity settings."""
+    """User units per SI unit; the signs contain the polarity settings."""
 
     position_per_rad: float
     speed_per_rad_s: float
@@ -50,9 +50,10 @@ class Units:
     ramp_reference_rad_s: float = 0.0
 
     def ramp(self, raw: float) -> float:
-        """Magnitude of an acceleration [rad/s²]; zero counts as the smallest step above it.
+        """Return an acceleration as a magnitude [rad/s²]; zero counts as the smallest step above
+        it.
 
-        A time of zero is no ramp (003:318 lets it be set).
+        A time of zero means no ramp (003:318 allows it).
         """
         if self.ramps_are_times_ms:
             return self.ramp_reference_rad_s / (raw or _NO_TIME_MS) * 1000.0
@@ -61,7 +62,7 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class FaultInfo:
-    """How a family reports one protection: 603Fh, and whether 605Eh may shape the reaction."""
+    """How a family reports one protection: 603Fh, and whether 605Eh determines the reaction."""
 
     code: int
     fixed: bool = False
@@ -71,7 +72,7 @@ class FaultInfo:
 
     @property
     def name(self) -> str:
-        """What distinguishes this fault from others."""
+        """Unique name of this fault."""
         return self.fault or f"{self.code:#06x}"
 
 
@@ -102,9 +103,9 @@ Action = Literal["fault", "warning", "stop"]
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """A protection whose action a parameter chooses; ``warning`` is shown instead of the fault.
+    """A protection whose action a parameter selects; ``warning`` is shown instead of the fault.
 
-    *fault* coasts, *warning* goes on, *stop* brakes and holds.
+    *fault* coasts, *warning* continues, *stop* brakes and holds.
     """
 
     key: str
@@ -115,7 +116,7 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class LimitSwitches:
-    """What the limit switches do: faults and warnings are (negative, positive) codes."""
+    """Action of the limit switches: faults and warnings are (negative, positive) codes."""
 
     action: Action = "stop"
     choice: Choice | None = None
@@ -125,7 +126,7 @@ class LimitSwitches:
 
 @dataclass(frozen=True, slots=True)
 class BrakeTimes:
-    """Course of the holding brake; see the brake sections of 000:1360 and 002:8117."""
+    """Sequence of the holding brake; see the brake sections of 000:1360 and 002:8117."""
 
     release_s: float = 0.0
     command_s: float = 0.0
@@ -135,18 +136,18 @@ class BrakeTimes:
     speed_rad_s: float = math.inf
 
 
-#: How the axis is stopped when the servo goes off or trips: (while moving, afterwards).
+#: How the axis is stopped at servo off or after a fault: (while moving, afterwards).
 OffStop = tuple[Literal["coast", "dynamic", "ramp"], Literal["free", "dynamic", "hold"]]
 
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """How a family stops apart from the ramps 6084h and 6085h of options 1 and 2.
+    """How a family stops, apart from the ramps 6084h and 6085h of options 1 and 2.
 
-    ``ramps`` gives other options their own deceleration parameter. ``slope_in_torque`` takes the
-    torque back by 6087h in torque modes. With ``waits`` a state is left only when the axis
-    stands, coasting too. ``off`` shows by a parameter how the servo goes off, ``first`` and
-    ``second`` how faults of the first and second kind stop (R6L).
+    ``ramps`` assigns other options their own deceleration parameter. ``slope_in_torque`` reduces
+    the torque by 6087h in torque modes. With ``waits`` a state is left only at standstill, also
+    when coasting. ``off`` selects by a parameter how the servo goes off, ``first`` and ``second``
+    how faults of the first and second kind stop (R6L).
     """
 
     ramps: dict[int, str] = field(default_factory=dict)
@@ -160,24 +161,25 @@ class Stops:
     first: tuple[str, dict[int, OffStop]] | None = None
     second: tuple[str, dict[int, OffStop]] | None = None
     emergency: tuple[str | None, dict[int, int]] | None = None
-    """Emergency stop input: a parameter, and the quick stop option that its values mean: −1
-    none, −2 that of 605Ah. Without a parameter the option stands under 0.
+    """Emergency stop input: a parameter, and the quick stop option for each of its values: −1 none,
+    −2 that of 605Ah. Without a parameter the option is under 0.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Documented behaviours that are a matter of yes or no, or of one number.
+    """Documented behaviours that are a yes or no, or one number.
 
     ``commands`` names what writing a raw value to a parameter does: save, restore, reset, zero,
     clear_history, write_settings, fault_reset. ``self_clearing`` commands read 0 afterwards.
-    ``communication_fault`` is 0 for a drive that does not watch its bus. ``protections`` names
+    ``communication_fault`` is 0 for a drive that does not monitor its bus. ``protections`` names
     the entries of the fault table that the protections report; a protection without one is off.
     ``disabled_bits`` are the state bits of "switch on disabled" (EP3E shows 0270h, 001:296).
-    ``index_at_once``: an axis that is on the index takes it without moving (000:2677).
-    ``homing_alarms`` are the warning and the fault of a homing that failed or ran out of time.
-    ``home_offset``: the zero position lies the offset beyond home (CiA 402-2), or the position
-    at home is the offset, or a parameter chooses (M6-L, 000:2213).
+
+    ``index_at_once``: an axis at the index accepts it without moving (000:2677). ``homing_alarms``
+    are the warning and the fault of a homing that failed or timed out. ``home_offset``: the zero
+    position lies the offset beyond home (CiA 402-2), or the position at home is the offset, or a
+    parameter selects (M6-L, 000:2213).
     """
 
     buffered_setpoints: bool = True
@@ -191,9 +193,9 @@ class Traits:
     acts_with_network: bool = False
     slow_store: bool = False
     eeprom_writes: float = math.inf
-    """Writes that the memory bears; own number where the manual warns of wear without one."""
+    """Endurance of the memory in writes; an assumed number if the manual only warns of wear."""
     write_protect: tuple[str, dict[int, frozenset[str]]] | None = None
-    """A parameter, and what stays writable in the maker's objects for each of its values."""
+    """A parameter, and the manufacturer's objects that stay writable for each of its values."""
     communication_fault: int = k.F_WATCHDOG
     faults: dict[int, FaultInfo] = field(default_factory=dict)
     commands: dict[str, dict[int, str]] = field(default_factory=dict)
@@ -209,7 +211,7 @@ class Traits:
     torque_speed_limit_key: str | None = None
     zero_speed_key: str | None = None
     torque_limits: tuple[str, str] | None = None
-    """The drive's own limits (positive, negative) next to those of CiA 402, in % by their scale."""
+    """The drive's own limits (positive, negative) besides those of CiA 402, in % by their scale."""
     second_gains: GainKeys | None = None
     switching: SwitchKeys | None = None
     compensation: CompensationKeys | None = None
@@ -220,7 +222,7 @@ class Traits:
     own_homing: OwnHomingKeys | None = None
     identifies_poles: bool = False
     brake_by_bus: bool = False
-    """Bit 0 of 60FEh applies the holding brake while process data carry it (EP3E, 001:970)."""
+    """Bit 0 of 60FEh applies the holding brake while process data contain it (EP3E, 001:970)."""
     speed_filter: tuple[str, str] | None = None
     """Low-pass of the speed feedback: parameter and "Hz", "ms" or "µs"."""
     feed_forward: FeedForward | None = None
@@ -236,64 +238,64 @@ class Traits:
     homing_alarms: tuple[str, str] = ("", "")
     software_limits: tuple[str, dict[int, Literal["off", "on", "homed"]]] | None = None
     unknown_faults_end: bool = False
-    """A reset ends faults of which nothing is known, as CiA 402-2 has it (transition 15)."""
+    """A reset ends faults with an unknown kind of reset, as in CiA 402-2 (transition 15)."""
     reset_after_s: dict[str, float] = field(default_factory=dict)
-    """Faults that a reset ends only after so long."""
+    """Faults that a reset ends only after this time [s]."""
     emergency_warning: str = ""
 
 
 class Family(Protocol):
-    """Everything the firmware asks of a family. Implementations hold no state of a drive."""
+    """Interface of the firmware to a family. Implementations hold no state of a drive."""
 
     name: str
     traits: Traits
     terminals: TerminalTable | None
-    """None for a family whose terminals are the MMS7's, or that has none."""
+    """None for a family with the terminals of the MMS7, or without terminals."""
     supply_v: float | None
-    """Supply of its power stage, None where it takes what the bench has."""
+    """Supply of its power stage [V], None to use that of the bench."""
 
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
-        """What the maker sets for this motor, whatever the manual prints."""
+        """Return the factory settings for this motor, whatever the manual prints."""
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
-        """Start values of parameters for which the manual prints none."""
+        """Return start values of parameters for which the manual prints none."""
 
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
-        """Units of the motion objects under the present gear settings."""
+        """Return the units of the motion objects for the present gear settings."""
 
     def loops(
         self, od: ObjectDictionary, profile: Profile, motor: MotorData, units: Units
     ) -> LoopSettings:
-        """Gains, filters and limits in SI units from the effective parameters."""
+        """Return gains, filters and limits in SI units from the effective parameters."""
 
     def protections(
         self, od: ObjectDictionary, motor: MotorData, units: Units
     ) -> ProtectionSettings:
-        """Thresholds in SI units from the effective parameters."""
+        """Return thresholds in SI units from the effective parameters."""
 
     def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:
-        """Monitor parameters and fault records of the maker's own, in engineering values."""
+        """Return the manufacturer's monitor parameters and fault records, in engineering values."""
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
-        """How the switches reach the drive."""
+        """Return how the switches are connected to the drive."""
 
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:
-        """Code of the fault with which the drive answers enabling as it is set, or None."""
+        """Return the code of the fault with which the drive refuses enabling, or None."""
 
     def gear_fault(self, od: ObjectDictionary) -> str | None:
-        """Code of the fault for a gear that the drive cannot make, or None."""
+        """Return the code of the fault for a gear that the drive cannot realise, or None."""
 
     def in_place_s(self, od: ObjectDictionary) -> float:
-        """How long the axis must be within its window to be in place."""
+        """Return how long the axis must be within its window to be in position [s]."""
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """Course of the holding brake, None where there is none or it has no timing."""
+        """Return the sequence of the holding brake, None without a brake or timing."""
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
-        """Measured objects of the maker's own, by key."""
+        """Return the manufacturer's measured objects, by key."""
 
 
 def inertia_kgm2(od: ObjectDictionary, key: str, fallback: float, scale: float = 1e-7) -> float:
-    """Inertia parameter (g·cm² by default) in kg·m²; an unset one gives ``fallback``."""
+    """Return an inertia parameter (g·cm² by default) in kg·m²; ``fallback`` if it is not set."""
     raw = od.number(key)
     return raw * scale if raw > 0 else fallback

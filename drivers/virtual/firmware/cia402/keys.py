@@ -1,4 +1,4 @@
-"""Parameters by which families do the same things: gains, feed-forward, homing, own tuning."""
+"""Parameters for functions common to several families: gains, feed-forward, homing, own tuning."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True, slots=True)
 class FeedForward:
-    """Parameters of the feed-forwards: gains in %, filter times in ms, selections (1 is on)."""
+    """Parameters of feed-forward: gains in %, filter times in ms, selections (1 is on)."""
 
     speed_gain: str
     speed_filter: str
@@ -19,7 +19,7 @@ class FeedForward:
 
 @dataclass(frozen=True, slots=True)
 class GainKeys:
-    """Parameters of one more gain set, in the units of the first."""
+    """Parameters of a further gain set, in the units of the first."""
 
     position: str | None = None
     speed: str | None = None
@@ -29,10 +29,10 @@ class GainKeys:
 
 @dataclass(frozen=True, slots=True)
 class SwitchKeys:
-    """Parameters that choose between the first and the second gains.
+    """Parameters that select between the first and the second gains.
 
-    ``kinds`` translates the condition to the kernel's SWITCH_*; ``on_raw`` are the values of
-    ``mode`` that let it switch, ``always_raw`` those that mean the second gains at all times.
+    ``kinds`` maps the condition to the kernel's SWITCH_*; ``on_raw`` are the values of ``mode``
+    that enable switching, ``always_raw`` those that select the second gains permanently.
     """
 
     mode: str
@@ -49,10 +49,10 @@ class SwitchKeys:
 
 @dataclass(frozen=True, slots=True)
 class SwingKeys:
-    """Notch of the position command: frequency and width, and how the drive finds them itself.
+    """Notch of the position command: frequency and width, and its automatic setting.
 
-    With ``mode`` at ``automatic_raw`` it takes the frequency of a deviation above ``threshold``
-    (command units).
+    With ``mode`` at ``automatic_raw`` the drive uses the frequency of a deviation above
+    ``threshold`` (command units).
     """
 
     frequency: str
@@ -81,7 +81,7 @@ class JogKeys:
     rise: str
     fall: str
     trigger: str | None = None
-    """A parameter that jogs: 1 forward, 2 backward, 0 ends it (values assumed)."""
+    """A parameter for jogging: 1 forward, 2 backward, 0 ends it (values assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ class CompensationKeys:
 class TorqueHoming:
     """Homing against the mechanical limit.
 
-    ``methods`` gives the direction of each method and whether it goes back to the index;
+    ``methods`` maps each method to its direction and whether it goes back to the index;
     ``torque_key`` is in ‰ of the rated torque, ``time_key`` in ms.
     """
 
@@ -153,7 +153,7 @@ class FoundNotchKeys:
 class LoadKeys:
     """Parameters: top speed [rpm], time to it [ms], pause [ms], the ratio; and the online mode.
 
-    ``ratio_per_one`` is the engineering value of the ratio parameter for a load like the rotor.
+    ``ratio_per_one`` is the engineering value of the ratio parameter for a load equal to the rotor.
     """
 
     speed: str

@@ -27,7 +27,7 @@ UNIT_GAIN = 100
 
 
 class LoopReader:
-    """Reads the loop settings of one drive as its parameters stand."""
+    """Reads the loop settings of one drive from its present parameters."""
 
     def __init__(
         self,
@@ -44,7 +44,7 @@ class LoopReader:
         self._units = units
 
     def settings(self) -> LoopSettings:
-        """Gains by the profile's convention; without one, 40 Hz speed and 6 Hz position loop."""
+        """Return gains by the profile's convention; default: 40 Hz speed, 40 /s position loop."""
         inertia = self._inertia()
         gains = self._profile.gains
         first = GainKeys()
@@ -81,19 +81,19 @@ class LoopReader:
         )
 
     def _value(self, key: str | None, default: float) -> float:
-        """A parameter in its engineering unit; 0 and a missing one give the default."""
+        """Return a parameter in its engineering unit; the default if it is 0 or missing."""
         parameter = self._profile.by_key.get(key or "")
         if parameter is None or key is None:
             return default
         return float(parameter.to_value(self._od.number(key))) or default
 
     def _gain_set(self, keys: GainKeys, inertia: float) -> GainSet:
-        """40 Hz speed loop, 20 ms and 40 /s where a family has no such parameter."""
+        """Return gains; 40 Hz speed loop, 20 ms and 40 /s where a family has no such parameter."""
         gains = self._profile.gains
         hertz, integral_ms, position = 40.0, 20.0, 40.0
         if gains is not None and gains.convention == "unit":
-            # No meaning is printed: what is there by default is treated as the moderate gains
-            # above, and everything else in proportion.
+            # No physical meaning is printed: the default values are treated as the moderate gains
+            # above, and all others in proportion.
             hertz *= self._share(keys.speed)
             integral_ms /= self._share(keys.integral)
             position *= self._share(keys.position)
@@ -145,7 +145,7 @@ class LoopReader:
         )
 
     def _third(self, inertia: float) -> ThirdGains | None:
-        """Gains at standstill, while gain switching is on (R6L, P06.06 to P06.08 and P06.56)."""
+        """Return gains at standstill while gain switching is on (R6L, P06.06-P06.08, P06.56)."""
         keys, switching = self._traits.third_gains, self._traits.switching
         if keys is None or switching is None or switching.third_delay is None:
             return None
@@ -155,7 +155,7 @@ class LoopReader:
         return ThirdGains(self._gain_set(keys, inertia), delay_s)
 
     def _swing(self) -> SwingFilter | None:
-        """Notch of the position command against the swing of a load; 0 Hz is off."""
+        """Return the notch of the position command against a load oscillation; 0 Hz is off."""
         keys = self._traits.swing
         hertz = 0.0 if keys is None else self._value(keys.frequency, 0.0)
         if keys is None or hertz <= 0.0:
@@ -177,7 +177,7 @@ class LoopReader:
         )
 
     def _speed_filter(self) -> float:
-        """Corner frequency of the speed feedback's low-pass [Hz]."""
+        """Return the corner frequency of the speed feedback's low-pass [Hz]."""
         if self._traits.speed_filter is None:
             return 1000.0
         key, unit = self._traits.speed_filter
@@ -187,7 +187,7 @@ class LoopReader:
         return number if unit == "Hz" else 1.0 / (TWO_PI * number * MS)
 
     def _feed_forward(self) -> tuple[float, float, float, float]:
-        """Shares and time constants [s] of speed and torque feed-forward."""
+        """Return shares and time constants [s] of speed and torque feed-forward."""
         keys = self._traits.feed_forward
         if keys is None:
             return (0.0, 0.0, 0.0, 0.0)
@@ -206,7 +206,7 @@ class LoopReader:
         )
 
     def _share(self, key: str | None) -> float:
-        """A gain without a unit over its start value."""
+        """Return a gain without a unit, relative to its start value."""
         parameter = self._profile.by_key.get(key or "")
         if parameter is None:
             return 1.0
@@ -224,7 +224,7 @@ class LoopReader:
         rotor = self._motor.rotor_inertia_kgm2
         parameter = self._profile.by_key.get(gains.inertia or "") if gains else None
         if gains is None or parameter is None or gains.inertia_meaning is None:
-            return rotor  # what a ratio without a printed unit means, nobody knows (003:711)
+            return rotor  # the meaning of a ratio without a printed unit is unknown (003:711)
         number = float(parameter.to_value(self._od.number(parameter.key)))
         if gains.inertia_meaning == "ratio_percent":
             return rotor * (1 + number / 100)

@@ -1,4 +1,4 @@
-"""The notches of the families that write them as frequency, width and depth."""
+"""Notches of the families that represent them as frequency, width and depth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from profiles.schema import NotchSlot, Profile
 
 
 def notches_of(profile: Profile, od: ObjectDictionary) -> tuple[Biquad, ...]:
-    """The notches that are on, at most four."""
+    """Return the enabled notches, at most four."""
     spec = profile.notch
     if spec is None:
         return ()
@@ -36,7 +36,7 @@ def _notch(profile: Profile, od: ObjectDictionary, encoding: str, slot: NotchSlo
     )
     if encoding == "hz_levels":
         # No formula is printed: width level/20 of the centre, depth level in percent of the
-        # amplitude that is left (0 is deepest). The default, the highest frequency, is off.
+        # remaining amplitude (0 is deepest). The default, the highest frequency, is off.
         frequency = profile.by_key[slot.frequency_key or ""]
         if od.number(frequency.key) == frequency.default_raw:
             return None

@@ -1,8 +1,8 @@
 """Protections and supply where a manual prints none.
 
-What no manual prints (thresholds of the power stage, the shape of the overload curve) is this
-virtual drive's own: I²t trips when the surplus of (torque/rated)² − 1 adds up to 24 s, that is
-after 3 s at three times the rated torque.
+Values that no manual prints (thresholds of the power stage, the overload curve) are specific to
+this virtual drive: I²t trips when the integral of (torque/rated)² − 1 reaches 24 s, that is after 3
+s at three times the rated torque.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import math
 from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
 
 I2T_S = 24.0
-#: Rectified 220 V mains; a family that states no supply takes the bench's own 48 V.
+#: Rectified 220 V mains; a family that states no supply uses the bench's own 48 V.
 MAINS_V = 310.0
 
 
 def own(motor: MotorData) -> ProtectionSettings:
-    """Shares of the supply and of the ratings."""
+    """Return protections as shares of the supply and of the ratings."""
     supply = motor.supply_v
     return ProtectionSettings(
         over_current_a=3.5 * math.sqrt(2) * motor.rated_current_a,

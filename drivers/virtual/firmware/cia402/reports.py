@@ -1,4 +1,4 @@
-"""How the protections of a family report: entries of its fault table, or the standard's codes."""
+"""How the protections of a family are reported: entries of its fault table, or standard codes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.virtual.firmware.cia402.base import FaultInfo
 from drivers.virtual.firmware.kernel import layout as k
 from profiles.schema import Profile
 
-#: Names of faults as manuals print them, per protection, and the standard's code (CiA 402-2).
+#: Printed names of faults per protection, and the standard's code (CiA 402-2).
 _FAULT_WORDS: tuple[tuple[int, str, int], ...] = (
     (k.F_OVER_CURRENT, r"over.?current", 0x2310),
     (k.F_UNDER_VOLTAGE, r"under.?voltage", 0x3220),
@@ -33,10 +33,10 @@ _FAULT_WORDS: tuple[tuple[int, str, int], ...] = (
 
 
 def faults_of(profile: Profile, protections: Mapping[int, str]) -> dict[int, FaultInfo]:
-    """How the protections report: the named entries of the table.
+    """Return how the protections are reported: the named entries of the table.
 
-    A family that names none (a profile made from a file) is searched by the printed words. Where
-    the table has no code of 603Fh (R6L), the standard's is shown.
+    For a family that names none (a profile made from a file), the printed names are searched. If
+    the table has no code of 603Fh (R6L), the standard's is used.
     """
     found: dict[int, FaultInfo] = {}
     for bit, words, standard in _FAULT_WORDS:

@@ -1,7 +1,8 @@
-"""CiA 402 drives whose conventions the profile reports: gains, notches, units, faults.
+"""CiA 402 drives whose conventions are in the profile: gains, notches, units, faults.
 
-What a profile cannot say is in the family's module (`drivers.virtual.firmware.families`); what
-no manual prints (thresholds of the power stage) is this virtual drive's own and said so below.
+Data that a profile cannot contain are in the family's module (`drivers.virtual.firmware.families`);
+data that no manual prints (thresholds of the power stage) are specific to this virtual drive and
+marked below.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class Cia402:
     """A family described by its profile; see `drivers.virtual.firmware.cia402.base.Family`.
 
     A family's module derives from it: it states its traits and terminals, and overrides what its
-    manual prints otherwise.
+    manual prints differently.
     """
 
     TRAITS: ClassVar[Traits] = Traits()
@@ -60,7 +61,7 @@ class Cia402:
         self.traits = replace(base, faults=base.faults or faults_of(profile, base.protections))
 
     def _table(self, profile: Profile) -> TerminalTable | None:
-        """The family's terminals, if this profile has their parameters."""
+        """Return the family's terminals, if this profile has their parameters."""
         table = self.TERMINALS
         if table is None:
             return None
@@ -69,7 +70,7 @@ class Cia402:
 
     # --- values ----------------------------------------------------------------------------
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
-        """Ratings where the profile names the objects, in the objects' own scale."""
+        """Return ratings if the profile has the objects, in the objects' own scale."""
         known = {
             "rated_torque": motor.rated_torque_nm,
             "rated_current": motor.rated_current_a,
@@ -83,11 +84,11 @@ class Cia402:
                 values[parameter.key] = parameter.to_raw(value * si_factor(parameter.unit))
         resolution = self._profile.by_key.get("608F:01")
         if resolution is not None and resolution.default_raw is None:
-            values[resolution.key] = spec.encoder.counts_per_rev  # what the drive reads from it
+            values[resolution.key] = spec.encoder.counts_per_rev  # as the drive reads it
         return values | unit_values(self._profile, spec.rough_feedback)
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
-        """A moderate axis: 10 rev/s, 50 rev/s², windows of 1/360 revolution."""
+        """Return a moderate axis: 10 rev/s, 50 rev/s², windows of 1/360 revolution."""
         units = self._units(1.0, motor)
         turn = units.position_per_rad * TWO_PI
         speed = units.speed_per_rad_s * TWO_PI
@@ -124,14 +125,14 @@ class Cia402:
             fallback |= {key: UNIT_GAIN for key in keys if key is not None}
         mode = self._profile.by_key.get("6060:00")
         if mode is not None and mode.enum and 0 not in mode.enum:
-            # A drive without "no mode" starts in one of those that it has (003:230).
+            # A drive without "no mode" starts in one of its modes (003:230).
             fallback["6060:00"] = min(self._profile.supported_modes)
         if self.traits.positive_limit_first:
             fallback |= {"607D:01": 2**31 - 1, "607D:02": -(2**31)}
         return fallback | self._start_gains()
 
     def _start_gains(self) -> dict[str, Raw]:
-        """The gains that `loops` takes where none are printed, so that they can be read."""
+        """Return the gains that `loops` uses where none are printed, so that they can be read."""
         gains = self._profile.gains
         if gains is None or gains.convention == "unit":
             return {}
@@ -148,7 +149,7 @@ class Cia402:
 
     # --- units -----------------------------------------------------------------------------
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
-        """Default increments per revolution, scaled by how far the gear differs from default."""
+        """Return default increments per revolution, scaled by the gear relative to its default."""
         spec = self._profile.units
         factor = self._ratio(od, spec.gear_denominator, spec.gear_numerator)
         factor *= self._ratio(od, spec.feed, spec.feed_revolutions)
@@ -161,14 +162,14 @@ class Cia402:
         )
 
     def _ratio(self, od: ObjectDictionary, above: str | None, below: str | None) -> float:
-        """(above/below) now over (above/below) by default."""
+        """Return the present (above/below) relative to its default."""
         result = 1.0
         for key, exponent in ((above, 1.0), (below, -1.0)):
             parameter = self._profile.by_key.get(key or "")
             if key is None or parameter is None:
                 continue
             printed = parameter.default_raw
-            # As `fallback_values` starts where the manual prints no default.
+            # As in `fallback_values` where the manual prints no default.
             start = self._default_turn() if key == self._profile.units.feed else 1.0
             default = float(printed) if isinstance(printed, (int, float)) and printed else start
             now = float(od.number(key, default))
@@ -177,7 +178,7 @@ class Cia402:
         return result
 
     def _default_turn(self) -> float:
-        """Increments per revolution with the gear as it starts."""
+        """Return increments per revolution with the default gear."""
         spec = self._profile.units
         return float(spec.counts_per_rev or spec.encoder_counts_per_rev or 10000)
 
@@ -207,7 +208,7 @@ class Cia402:
         motor: MotorData,
         units: Units,
     ) -> LoopSettings:
-        """Gains by the profile's convention; see `drivers.virtual.firmware.cia402.loops`."""
+        """Return gains by the profile's convention; see `drivers.virtual.firmware.cia402.loops`."""
         return LoopReader(self._profile, self.traits, od, motor, units).settings()
 
     def protections(
@@ -216,7 +217,7 @@ class Cia402:
         motor: MotorData,
         units: Units,  # noqa: ARG002 - the seam's signature
     ) -> ProtectionSettings:
-        """The virtual drive's own, refined by the parameters that the family has."""
+        """Return the virtual drive's own protections, refined by the parameters of the family."""
         base = self.refined(od, motor, power.own(motor))
         window = self._profile.by_role.get("following_error_window")
         size = od.number("6065:00" if window is None else window.key)
@@ -231,31 +232,31 @@ class Cia402:
         motor: MotorData,  # noqa: ARG002
         base: ProtectionSettings,
     ) -> ProtectionSettings:
-        """The protections as the family's parameters set them; ``base`` where it has none."""
+        """Return the protections set by the family's parameters; ``base`` without parameters."""
         return base
 
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
-        """Nothing is refused."""
+        """Return None: nothing is refused."""
         return None
 
     def gear_fault(self, od: ObjectDictionary) -> str | None:  # noqa: ARG002 - the seam's
-        """None is printed."""
+        """Return None: no such fault is printed."""
         return None
 
     def in_place_s(self, od: ObjectDictionary) -> float:
-        """6068h."""
+        """Return the time in 6068h [s]."""
         return od.number("6068:00", 10) * MS
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:  # noqa: ARG002 - the seam's
-        """None is printed."""
+        """Return None: no brake times are printed."""
         return None
 
     def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:  # noqa: ARG002
-        """None that a profile could show."""
+        """Return no monitors: a profile cannot describe any."""
         return {}
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
-        """Objects that a profile reports by role but that CiA 402 has no number for."""
+        """Return objects that a profile assigns by role but that have no number in CiA 402."""
         item = axis.s.item
         sources: dict[str, tuple[int, float]] = {
             "dc_voltage": (k.S_VOLTAGE, 1.0),
@@ -271,5 +272,5 @@ class Cia402:
         return values
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
-        """By the functions of the terminals; a family without a table sees all switches."""
+        """Return the wiring by terminal functions; a family without a table has all switches."""
         return Wiring() if self.terminals is None else self.terminals.wiring(od)

@@ -1,8 +1,8 @@
 """Terminals of a family as data: functions, polarities, forcing, and their bits in 60FDh.
 
-Codes are those of the manuals' tables: 000:3257-3290, 002:8989-9350, 003:495-540, 001:950-1000.
-The virtual machine's switches have normally open contacts and are wired to whichever input has
-their function; where none has it, the drive does not see the switch.
+Codes are those of the manuals' tables: 000:3257-3290, 002:8989-9350, 003:495-540, 001:950-1000. The
+virtual machine's switches have normally open contacts and are wired to the input with their
+function; if none has it, the drive does not receive the switch.
 """
 
 from __future__ import annotations
@@ -31,21 +31,21 @@ SWITCHES: dict[InputUse, int] = {
 
 @dataclass(frozen=True, slots=True)
 class Logic:
-    """Where a polarity stands: a bit of a parameter, or a whole parameter with a value."""
+    """Location of a polarity setting: a bit of a parameter, or a whole parameter with a value."""
 
     key: str
     bit: int | None = None
     inverted_raw: int = 1
 
     def inverted(self, od: ObjectDictionary) -> bool:
-        """Whether the level is turned round."""
+        """Return whether the level is inverted."""
         raw = int(od.number(self.key))
         return bool(raw >> self.bit & 1) if self.bit is not None else raw == self.inverted_raw
 
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """One input. ``fixed`` is its use where no parameter chooses one."""
+    """One input. ``fixed`` is its use if no parameter selects one."""
 
     name: str
     bit: int | None
@@ -53,7 +53,7 @@ class Input:
     logic: Logic | None = None
     fixed: InputUse | None = None
     virtual: tuple[str, int] | None = None
-    """A parameter's bit that switches it on besides its terminal."""
+    """A parameter's bit that switches it on in addition to its terminal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,23 +82,23 @@ class TerminalTable:
     bus_outputs_need_cycles: bool = False
     masks_outputs: bool = True
     keep_key: str | None = None
-    """What its outputs do when process data end: a set bit switches the output off."""
+    """State of its outputs when process data end: a set bit switches the output off."""
     probe_bits: tuple[int, int] | None = None
 
     def use_of(self, terminal: Input, od: ObjectDictionary) -> InputUse | None:
-        """What an input does now."""
+        """Return the present function of an input."""
         if terminal.function_key is None:
             return terminal.fixed
         return self.input_uses.get(int(od.number(terminal.function_key)))
 
     def output_use(self, terminal: Output, od: ObjectDictionary) -> OutputUse | None:
-        """What an output shows now."""
+        """Return the present function of an output."""
         if terminal.function_key is None:
             return terminal.fixed
         return self.output_uses.get(int(od.number(terminal.function_key)))
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
-        """How the machine's switches reach the loops."""
+        """Return how the machine's switches are connected to the loops."""
         forced = k.SIG_NEGATIVE | k.SIG_POSITIVE | k.SIG_HOME
         forced_on = inverted = 0
         for terminal in self.inputs:
@@ -115,7 +115,7 @@ class TerminalTable:
 
 
 def is_virtually_on(terminal: Input, od: ObjectDictionary) -> bool:
-    """Switched on by a parameter."""
+    """Return whether a parameter switches the input on."""
     if terminal.virtual is None:
         return False
     key, bit = terminal.virtual
@@ -123,7 +123,7 @@ def is_virtually_on(terminal: Input, od: ObjectDictionary) -> bool:
 
 
 class InputPin:
-    """One input of a drive, its parameters looked up once: it is read in every cycle."""
+    """One input of a drive, with its parameters looked up once, as it is read in every cycle."""
 
     __slots__ = ("_fixed", "_function", "_inverted_raw", "_logic", "_logic_bit", "_uses",
                  "_virtual", "_virtual_bit", "bit")  # fmt: skip
@@ -142,13 +142,13 @@ class InputPin:
 
     @property
     def use(self) -> InputUse | None:
-        """What the input does now."""
+        """Present function of the input."""
         if self._function is None:
             return self._fixed
         return self._uses.get(int(self._function.active))
 
     def level(self, external: bool, pressed: int) -> bool:
-        """Logic level: after polarity and forcing. ``pressed``: switches of the machine."""
+        """Return the logic level after polarity and forcing. ``pressed``: active switches."""
         if self._virtual is not None and int(self._virtual.active) >> self._virtual_bit & 1:
             return True
         on = external

@@ -1,7 +1,7 @@
-"""One module per family, named as its profile: all that a virtual drive of it does by itself.
+"""One module per family, named as its profile, with the specific behaviour of its virtual drive.
 
-A module has one function, ``family(profile)``, which answers the `Family` of that profile. A new
-family is one more module; nothing else lists them.
+A module has one function, ``family(profile)``, which returns the `Family` of that profile. A new
+family needs only one more module; there is no other list.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from profiles.schema import Profile
 
 
 def names() -> list[str]:
-    """Families with a virtual drive, in the order of the alphabet."""
+    """Return families with a virtual drive, in alphabetical order."""
     return sorted(module.name for module in iter_modules(__path__))
 
 
 def family_of(profile: Profile, name: str) -> Family:
-    """What the drives of the family ``name`` do, with this profile.
+    """Return the behaviour of the family ``name`` with this profile.
 
     Raises:
         KeyError: no such family.

@@ -15,9 +15,9 @@ from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
 from profiles.schema import Profile, Raw
 
-#: Xinlichuan DS_C: 2200h to 2203h are triggers that stay until they are written back to 0
-#: (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit. The manual prints
-#: no watchdog of any kind: with the line cut, the drive goes on with its last command. Control
+#: Xinlichuan DS_C: 2200h to 2203h are triggers that keep their value until they are written back to
+#: 0 (003:411-422); own status word (003:298-308); 607Dh:01 is the positive limit. The manual prints
+#: no watchdog of any kind: with the line cut, the drive continues with its last command. Control
 #: word 11 is an emergency stop (003:296); its ramp is not printed, 6084h is assumed.
 TRAITS = Traits(
     commands={
@@ -60,13 +60,16 @@ TERMINALS = TerminalTable(
 
 
 class DsC(Cia402):
-    """What these drives do beyond what their profile says."""
+    """Behaviour of these drives in addition to their profile."""
 
     TRAITS = TRAITS
     TERMINALS = TERMINALS
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
-        """In-place window and time, out-of-tolerance threshold; origin and limits on DI0 to DI2."""
+        """Return fallback values in addition to those of `Cia402`.
+
+        In-position window and time, out-of-tolerance threshold; home and limits on DI0 to DI2.
+        """
         values = super().fallback_values(motor)
         turn = values["6065:00"]
         return values | {
@@ -79,13 +82,13 @@ class DsC(Cia402):
         }
 
     def in_place_s(self, od: ObjectDictionary) -> float:
-        """2502h (003:577)."""
+        """Return the time in 2502h [s] (003:577)."""
         return od.number("2502:00", 10) * MS
 
     def refined(
         self, od: ObjectDictionary, motor: MotorData, base: ProtectionSettings
     ) -> ProtectionSettings:
-        """2506h (003:591): the current that may flow for long; no over-speed fault is printed."""
+        """Apply 2506h (003:591), the continuous current; no over-speed fault is printed."""
         continuous = od.number("2506:00", 2500) / 1000
         return replace(
             base,
@@ -95,7 +98,7 @@ class DsC(Cia402):
         )
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """2401h, 2402h and an output with function 6 (003:544-549)."""
+        """Return times by 2401h, 2402h and an output with function 6 (003:544-549)."""
         if all(od.number(f"2400:{sub:02X}", -1) != 6 for sub in (0x0D, 0x0E, 0x0F)):
             return None
         closing = od.number("2402:00") * MS
@@ -105,5 +108,5 @@ class DsC(Cia402):
 
 
 def family(profile: Profile) -> DsC:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return DsC(profile)

@@ -11,10 +11,10 @@ from profiles.schema import Profile
 
 
 class El7(Cia402):
-    """What these drives do beyond what their profile says.
+    """Behaviour of these drives in addition to their profile.
 
-    How the second gains are switched is not public, so the virtual drive keeps the first. Which
-    alarm each protection raises follows from the names in table 8.2 of the manual.
+    How the second gains are switched is not public, so the virtual drive keeps the first. The alarm
+    of each protection is derived from the names in table 8.2 of the manual.
     """
 
     TRAITS = Traits(
@@ -46,5 +46,5 @@ class El7(Cia402):
 
 
 def family(profile: Profile) -> El7:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return El7(profile)

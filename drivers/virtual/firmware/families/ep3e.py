@@ -14,8 +14,8 @@ from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.monitors import Sources, Value
 from profiles.schema import Profile
 
-#: Maxsine EP3E: 1010h:01 saves and restores (001:1209); 6041h bit 15 (001:372); the home offset
-#: is the position at home (001:687-691); stops and their states 001:870-945, EMG by P164.
+#: Maxsine EP3E: 1010h:01 saves and restores (001:1209); 6041h bit 15 (001:372); the home offset is
+#: the position at home (001:687-691); stops and their states 001:870-945, EMG by P164.
 TRAITS = Traits(
     commands={"1010:01": {0x45534554: "save", 0x45444546: "restore"}},
     self_clearing=True,
@@ -53,8 +53,8 @@ TRAITS = Traits(
     listed_options_only=True,
 )
 
-#: The parameters that select the functions stand before the excerpt: EMG on DI1, POT on DI2, NOT
-#: on DI3 and HOME on DI4 are this virtual drive's own wiring; HDI1 and HDI2 as printed (001:752).
+#: The parameters that select the functions precede the excerpt: EMG on DI1, POT on DI2, NOT on DI3
+#: and HOME on DI4 are this virtual drive's own wiring; HDI1 and HDI2 as printed (001:752).
 TERMINALS = TerminalTable(
     inputs=(
         Input("DI1", 19, fixed="emergency"),
@@ -78,20 +78,20 @@ TERMINALS = TerminalTable(
 
 
 class Ep3e(Cia402):
-    """What these drives do beyond what their profile says."""
+    """Behaviour of these drives in addition to their profile."""
 
     TRAITS = TRAITS
     TERMINALS = TERMINALS
     supply_v = MAINS_V
 
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
-        """No mode, or one that it has not (001:1538-1547)."""
+        """Refuse no mode, or a mode that the drive does not have (001:1538-1547)."""
         if mode == 0:
             return "Err88"
         return None if mode in self._profile.supported_modes else "Err89"
 
     def gear_fault(self, od: ObjectDictionary) -> str | None:
-        """From 1/1000 to 1000 (001:1035), else Err80."""
+        """Return Err80 outside 1/1000 to 1000 (001:1035)."""
         parts = [od.number(key) for key in ("608F:01", "6091:01", "6092:02", "6091:02", "6092:01")]
         if 0 in parts:
             return "Err80"
@@ -99,11 +99,11 @@ class Ep3e(Cia402):
         return None if 1e-3 <= ratio <= 1e3 else "Err80"
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:  # noqa: ARG002 - the seam's
-        """A brake output without printed times (EP3E: BRK and BRKNET, 001:22, 001:27)."""
+        """Return a brake output without printed times (EP3E: BRK and BRKNET, 001:22, 001:27)."""
         return BrakeTimes()
 
     def monitors(self, sources: Sources) -> dict[str, Value]:
-        """2600h to 26A2h (001:77-130)."""
+        """Return the monitors 2600h to 26A2h (001:77-130)."""
         f = sources
         motor = f.core.motor
         return {
@@ -130,5 +130,5 @@ class Ep3e(Cia402):
 
 
 def family(profile: Profile) -> Ep3e:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return Ep3e(profile)

@@ -13,11 +13,11 @@ TRAITS = Traits(
 
 
 class Generic402(Cia402):
-    """What these drives do beyond what their profile says."""
+    """Behaviour of these drives in addition to their profile."""
 
     TRAITS = TRAITS
 
 
 def family(profile: Profile) -> Generic402:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return Generic402(profile)

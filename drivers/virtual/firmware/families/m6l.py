@@ -42,8 +42,8 @@ from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
 from drivers.virtual.firmware.states import State
 from profiles.schema import Profile
 
-#: P08.09 (000:3399). What the level of each condition is counted in is not printed: torque in %,
-#: speeds in rpm, the change of speed in 10 rpm/s and the deviation in command units are assumed.
+#: P08.09 (000:3399). The unit of the level of each condition is not printed: torque in %, speeds in
+#: rpm, the change of speed in 10 rpm/s and the deviation in command units are assumed.
 _CONDITIONS = {
     1: k.SWITCH_INPUT,
     2: k.SWITCH_TORQUE,
@@ -57,12 +57,12 @@ _CONDITIONS = {
     10: k.SWITCH_COMMANDED_OR_FAST,
 }
 
-#: Megmeet M6-L: parameters of the bus go to the EEPROM while P17.24 is 1 (000:3669-3673), saving
-#: and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254), feed-forward by
-#: P08.14 to P08.17 with the selections P05.16 and P06.18 (000:3407-3410, 000:3310, 000:3360).
-#: Homing -1 to -4 by P23.20 and P23.21 (000:2701-2756), 33 and 34 turn round at a limit switch
-#: (000:2679, 000:2693), time limit P12.09 (000:3635). P12.11 says what the home offset does
-#: (000:2213-2222). Stops 000:3006-3030; what faults do P10.01, P10.04 and P10.06 say
+#: Megmeet M6-L: parameters written over the bus go to the EEPROM while P17.24 is 1 (000:3669-3673),
+#: saving and restoring by P17.26 (000:3675), history and defaults by P02.22 (000:3254),
+#: feed-forward by P08.14 to P08.17 with the selections P05.16 and P06.18 (000:3407-3410, 000:3310,
+#: 000:3360). Homing -1 to -4 by P23.20 and P23.21 (000:2701-2756), 33 and 34 reverse at a limit
+#: switch (000:2679, 000:2693), time limit P12.09 (000:3635). P12.11 selects the meaning of the home
+#: offset (000:2213-2222). Stops 000:3006-3030; reactions to faults by P10.01, P10.04 and P10.06
 #: (000:3471-3476). Default 2 of P10.04 is not among the printed meanings: treated as 1.
 TRAITS = Traits(
     commands={
@@ -214,7 +214,7 @@ TERMINALS = TerminalTable(
 
 
 class M6l(Cia402):
-    """What these drives do beyond what their profile says."""
+    """Behaviour of these drives in addition to their profile."""
 
     TRAITS = TRAITS
     TERMINALS = TERMINALS
@@ -223,7 +223,7 @@ class M6l(Cia402):
     def refined(
         self, od: ObjectDictionary, motor: MotorData, base: ProtectionSettings
     ) -> ProtectionSettings:
-        """P10.07, P10.09, P10.10, P10.12, P02.18 and P02.20 (000:3480-3485, 000:3245-3247)."""
+        """Apply P10.07, P10.09, P10.10, P10.12, P02.18, P02.20 (000:3480-3485, 000:3245-3247)."""
         resistor = int(od.number("2002:13"))
         external = float(od.number("2002:15"))
         over_speed = float(od.number("200A:0D"))
@@ -238,7 +238,7 @@ class M6l(Cia402):
         )
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """P01.17, P02.10 to P02.13 and an output with function 18 (000:1360-1425)."""
+        """Return times by P01.17, P02.10-P02.13 and an output with function 18 (000:1360-1425)."""
         assigned = any(od.number(f"2003:{sub:02X}", -1) == 18 for sub in range(0x10, 0x15))
         if od.number("2001:12") != 1 or not assigned:
             return None
@@ -251,7 +251,7 @@ class M6l(Cia402):
         )
 
     def monitors(self, sources: Sources) -> dict[str, Value]:
-        """P11 (000:3558-3615) and the three records of P10.18 to P10.59 (000:3497-3556)."""
+        """Return P11 (000:3558-3615) and the three records of P10.18 to P10.59 (000:3497-3556)."""
         f = sources
         axis, control = f.core.axis, f.control
         values: dict[str, Value] = {
@@ -288,7 +288,7 @@ class M6l(Cia402):
 
 
 def _run_state(f: Sources) -> int:
-    """P11.11: run, direction, zero speed (000:3569)."""
+    """Return P11.11: run, direction, zero speed (000:3569)."""
     speed = f.item(k.S_OMEGA)
     running = f.control.state is State.OPERATION_ENABLED
     return running | (speed >= 0) << 1 | (f.item(k.S_ZERO_T) > 0) << 2
@@ -320,5 +320,5 @@ def _record(f: Sources, age: int, code: int, first: int) -> dict[str, Value]:
 
 
 def family(profile: Profile) -> M6l:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return M6l(profile)

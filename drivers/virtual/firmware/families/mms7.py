@@ -88,7 +88,7 @@ class Mms7:
     )
 
     def factory_values(self, spec: MechanicsSpec, motor: MotorData) -> dict[str, Raw]:
-        """Motor data (2001h) and ratings; inertia is the rotor's until it is identified."""
+        """Return motor data (2001h) and ratings; inertia is the rotor's until it is identified."""
         return {
             "2001:01": round(motor.resistance_ohm * 1e3),
             "2001:02": round(motor.inductance_h * 1e6),
@@ -102,11 +102,11 @@ class Mms7:
         }
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:  # noqa: ARG002 - the seam's
-        """Everything that matters has a printed default."""
+        """Return none: all relevant parameters have a printed default."""
         return {}
 
     def units(self, od: ObjectDictionary, motor: MotorData) -> Units:
-        """Gear ratio and feed constant (004:1853-1948), polarity (004:7261-7272)."""
+        """Apply gear ratio and feed constant (004:1853-1948) and polarity (004:7261-7272)."""
         feed = od.number("6092:01", 65536) / max(od.number("6092:02", 1), 1)
         gear = od.number("6091:01", 1) / max(od.number("6091:02", 1), 1)
         per_rad = max(feed, 1) / (gear or 1) / TWO_PI
@@ -122,7 +122,7 @@ class Mms7:
     def loops(
         self, od: ObjectDictionary, profile: Profile, motor: MotorData, units: Units
     ) -> LoopSettings:
-        """2001h, 2003h to 2008h; see the sections of 004:2847-3511."""
+        """Read 2001h, 2003h to 2008h; see the sections of 004:2847-3511."""
         number = od.number
         inertia = inertia_kgm2(od, "2001:06", 1e-5)
         feed_forward = int(number("2004:01"))
@@ -172,7 +172,7 @@ class Mms7:
         keys: tuple[str, str, str],
         table_index: int,
     ) -> GainSet:
-        """Manual gains, or a row of the stiffness table (table 38, 004:3001-3034)."""
+        """Return manual gains, or a row of the stiffness table (table 38, 004:3001-3034)."""
         values = [float(od.number(key)) for key in keys]
         mode, level = (("2005:0E", "2005:0F"), ("2005:10", "2005:11"))[table_index]
         if od.number(mode) == 1 and profile.stiffness:
@@ -184,7 +184,7 @@ class Mms7:
 
     @staticmethod
     def _notches(od: ObjectDictionary) -> tuple[Biquad, ...]:
-        """Coefficients stored as round(c × 10000) + 32768 (004:3494-3499)."""
+        """Read coefficients stored as round(c × 10000) + 32768 (004:3494-3499)."""
         enabled = int(od.number("2008:01"))
         notches = []
         for slot in range(4):
@@ -198,7 +198,11 @@ class Mms7:
     def protections(
         self, od: ObjectDictionary, motor: MotorData, units: Units
     ) -> ProtectionSettings:
-        """Protection enable bits (004:6177-6187) gate what they name; the rest always acts."""
+        """Return the protections.
+
+        The enable bits (004:6177-6187) apply to the protections they name; others are always
+        active.
+        """
         number, off = od.number, math.inf
         enabled = int(number("200B:01"))
         upper = number("200B:09", 56)
@@ -221,23 +225,23 @@ class Mms7:
         )
 
     def refusal(self, od: ObjectDictionary, mode: int) -> str | None:  # noqa: ARG002 - the seam's
-        """Nothing is refused."""
+        """Return None: nothing is refused."""
         return None
 
     def gear_fault(self, od: ObjectDictionary) -> str | None:  # noqa: ARG002 - the seam's
-        """None is printed."""
+        """Return None: no such fault is printed."""
         return None
 
     def in_place_s(self, od: ObjectDictionary) -> float:
-        """6068h."""
+        """Return the time in 6068h [s]."""
         return od.number("6068:00", 10) * 1e-3
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:  # noqa: ARG002 - the seam's
-        """The brake follows the power stage; the manual prints no times (004:2604)."""
+        """Return None: the brake follows the power stage; no times are printed (004:2604)."""
         return None
 
     def readings(self, axis: VirtualAxis) -> dict[str, Callable[[], Number]]:
-        """Servo internal information 200Eh and temperature (004:6407-6469, 004:6580)."""
+        """Return servo internal information 200Eh and temperature (004:6407-6469, 004:6580)."""
         item = axis.s.item
         inc_per_rad = 65536 / TWO_PI
         return {
@@ -255,14 +259,14 @@ class Mms7:
         }
 
     def monitors(self, sources: Sources) -> dict[str, Callable[[], float]]:  # noqa: ARG002
-        """All of them are `readings`."""
+        """Return none: all of them are in `readings`."""
         return {}
 
     def wiring(self, od: ObjectDictionary) -> Wiring:
-        """Terminal functions 2030h, polarity and simulation 2031h (004:6470-6579).
+        """Apply terminal functions 2030h, polarity and simulation 2031h (004:6470-6579).
 
         The virtual switches have normally closed contacts, the printed default: a polarity of
-        normally open turns their meaning round.
+        normally open inverts their meaning.
         """
         forced, forced_on, inverted = k.SIG_NEGATIVE | k.SIG_POSITIVE | k.SIG_HOME, 0, 0
         polarity = int(od.number("2031:01"))
@@ -280,7 +284,7 @@ class Mms7:
 
 
 def _raw_row(profile: Profile, table: StiffnessTable, row: tuple[float, ...]) -> list[float]:
-    """A row in raw values; with ``column_units`` it is printed in engineering values."""
+    """Return a row in raw values; with ``column_units`` it is printed in engineering values."""
     if not table.column_units:
         return list(row)
     return [
@@ -292,11 +296,11 @@ def _raw_row(profile: Profile, table: StiffnessTable, row: tuple[float, ...]) ->
 def _bandwidth_gains(
     position: float, speed: float, integral: float, inertia_kgm2: float
 ) -> GainSet:
-    """Bandwidths in 0.1 Hz to gains: the rigid plant 1/(J·s) crosses over at the bandwidth."""
+    """Convert bandwidths in 0.1 Hz to gains: the crossover of the rigid plant 1/(J·s)."""
     kp = inertia_kgm2 * TWO_PI * speed * 0.1
     return GainSet(TWO_PI * position * 0.1, kp, kp * TWO_PI * integral * 0.1)
 
 
 def family(profile: Profile) -> Mms7:  # noqa: ARG001 - all of it stands here
-    """The family."""
+    """Return the family."""
     return Mms7()

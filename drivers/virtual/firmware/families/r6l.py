@@ -37,7 +37,7 @@ from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
 from drivers.virtual.firmware.states import State
 from profiles.schema import Profile, Raw
 
-#: P06.51 (002:10800); the same is said of its levels as above.
+#: P06.51 (002:10800); units of the levels are assumed as for the M6-L.
 _CONDITIONS = {
     1: k.SWITCH_INPUT,
     2: k.SWITCH_TORQUE,
@@ -77,7 +77,7 @@ _FIRST: dict[int, OffStop] = {
     5: ("dynamic", "free"),
 }
 
-#: Rtelligent R6L: 200Ch (002:11782 on); what 2008h:0C permits is stored when written;
+#: Rtelligent R6L: 200Ch (002:11782 on); indices enabled by 2008h:0C are stored when written;
 #: feed-forward in 2006h (002:10669-10705). The position at home is the home offset (002:4344).
 #: 605Ah and 605Dh are printed without meanings (002:12828): those of CiA 402-2, current limit by
 #: P05.50. Which of its alarms an EtherCAT watchdog raises is not printed: AL.293 is assumed.
@@ -195,21 +195,21 @@ TERMINALS = TerminalTable(
 
 
 class R6l(Cia402):
-    """What these drives do beyond what their profile says."""
+    """Behaviour of these drives in addition to their profile."""
 
     TRAITS = TRAITS
     TERMINALS = TERMINALS
     supply_v = MAINS_V
 
     def fallback_values(self, motor: MotorData) -> dict[str, Raw]:
-        """With the highest speed of its motor."""
+        """Add the highest speed of the motor."""
         highest_rpm = round(1.2 * motor.rated_speed_rad_s / RPM)
         return super().fallback_values(motor) | {"2000:16": highest_rpm}
 
     def refined(
         self, od: ObjectDictionary, motor: MotorData, base: ProtectionSettings
     ) -> ProtectionSettings:
-        """P01.24 to P01.27, P01.48, P01.49, P01.57 to P01.61, P01.80, P01.82 and P00.21."""
+        """Apply P01.24 to P01.27, P01.48, P01.49, P01.57 to P01.61, P01.80, P01.82 and P00.21."""
         resistor = int(od.number("2001:19", 1))
         limit = min(od.number("60E0:00", 3000), od.number("6072:00", 3000), 3000) / 1000
         own_level = od.number("2001:53", 2400) / 1000
@@ -223,7 +223,7 @@ class R6l(Cia402):
             brake_on_v=on_v,
             brake_off_v=0.97 * on_v,
             brake_enabled=resistor != 2,
-            # 50 Ω built in (002:242), or what P01.26 says of an external one.
+            # 50 Ω built in (002:242), or P01.26 for an external one.
             braking_ohm=50.0 if resistor == 0 else max(float(od.number("2001:1B", 50)), 1.0),
             over_speed_rad_s=(fastest or 1.2 * motor.rated_speed_rad_s / RPM) * RPM
             if not od.number("2001:51")
@@ -231,13 +231,16 @@ class R6l(Cia402):
             i2t_s=I2T_S if int(od.number("2001:3E", 3)) & 1 else math.inf,
             i2t_rated_nm=max(od.number("2001:3C", 100), 40) / 100 * motor.rated_torque_nm,
             locked_s=od.number("2001:3A", 200) * MS if stall is not None else math.inf,
-            # A little below, so that a torque at its limit counts.
+            # Slightly below, so that a torque at its limit counts.
             locked_nm=0.99 * (stall or 0.0) * motor.rated_torque_nm,
             locked_angle_rad=0.02,
         )
 
     def brake(self, od: ObjectDictionary) -> BrakeTimes | None:
-        """P01.04, P01.05, P01.11 to P01.13 and an output with function 0 (002:8117-8273)."""
+        """Return the brake times (002:8117-8273); None if no output has function 0.
+
+        The times are in P01.04, P01.05 and P01.11 to P01.13.
+        """
         if all(od.number(f"2002:{sub:02X}", -1) != 0 for sub in (0x21, 0x23, 0x25, 0x27)):
             return None
         hold = od.number("2001:0E", 200) * MS
@@ -251,7 +254,7 @@ class R6l(Cia402):
         )
 
     def monitors(self, sources: Sources) -> dict[str, Value]:
-        """Group P13 (002:12090-12685); 200Dh:24 chooses one of the ten records."""
+        """Return group P13 (002:12090-12685); 200Dh:24 selects one of the ten records."""
         f = sources
 
         def record() -> Record:
@@ -287,10 +290,10 @@ class R6l(Cia402):
 
 
 def _newest_number(control: DeviceControl) -> int:
-    """Number of the newest active fault, 0 without one."""
+    """Return the number of the newest active fault, 0 without one."""
     return control.alarms.log.at(0).number if control.alarms.active else 0
 
 
 def family(profile: Profile) -> R6l:
-    """The family as this profile describes it."""
+    """Return the family described by this profile."""
     return R6l(profile)

@@ -1,4 +1,4 @@
-"""What is subtracted from the command, and added to the torque, for the load's sake."""
+"""Corrections of command and torque for the load."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from drivers.virtual.firmware.kernel import layout as k
 
 @njit(nogil=True)
 def shape_command(p, s):  # type: ignore[no-untyped-def]
-    """What a notch (s² + ω²)/(s² + 2ζωs + ω²) takes from the demanded position, and its rate.
+    """Compute the part of demanded position and speed removed by (s² + ω²)/(s² + 2ζωs + ω²).
 
     The part subtracted is 2ζω/(s² + 2ζωs + ω²) of the demanded speed, so that a constant position
-    passes unchanged and the swing of a load at ω is not excited.
+    passes unchanged and an oscillation of the load at ω is not excited.
     """
     if p[k.P_SHAPE_ON] == 0.0:
         s[k.S_SHAPE] = 0.0
@@ -25,12 +25,12 @@ def shape_command(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _quadrant_compensation(p, s):  # type: ignore[no-untyped-def]
-    """Torque after the demand has turned round: late, filtered, and over a length of travel."""
+    """Return the torque after a reversal of the demand: delayed, filtered, over a travel."""
     sign = 1.0 if s[k.S_V_DEMAND] > 0.0 else -1.0 if s[k.S_V_DEMAND] < 0.0 else 0.0
     if sign != 0.0 and sign != s[k.S_QUADRANT_SIGN]:
         turned = s[k.S_QUADRANT_SIGN] != 0.0
         s[k.S_QUADRANT_SIGN] = sign
-        s[k.S_QUADRANT_T] = 0.0 if turned else -1.0  # setting off is no turn
+        s[k.S_QUADRANT_T] = 0.0 if turned else -1.0  # starting from standstill is not a reversal
         s[k.S_QUADRANT_FROM] = s[k.S_P_DEMAND]
     if s[k.S_QUADRANT_T] >= 0.0:
         s[k.S_QUADRANT_T] += k.STEP_S
@@ -45,7 +45,7 @@ def _quadrant_compensation(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def friction_compensation(p, s):  # type: ignore[no-untyped-def]
-    """Torque that the drive adds for friction by the direction of the demand, and its bias."""
+    """Return the torque added for friction by the direction of the demand, and the bias."""
     torque = p[k.P_TORQUE_BIAS] + p[k.P_FRICTION_VISCOUS] * s[k.S_V_DEMAND]
     torque += _quadrant_compensation(p, s)
     if s[k.S_V_DEMAND] > 0.0:

@@ -15,7 +15,7 @@ from drivers.virtual.firmware.kernel.gains import select_gains, third_share
 
 @njit(nogil=True)
 def _speed_controller(p, s, reference, mix, third):  # type: ignore[no-untyped-def]
-    """PI controller with torque feed-forward; returns the torque and the integral's increment."""
+    """Compute PI control with torque feed-forward; return torque and the integral's increment."""
     kp = p[k.P_KP_SPEED_1] + mix * (p[k.P_KP_SPEED_2] - p[k.P_KP_SPEED_1])
     kp += third * (p[k.P_KP_SPEED_3] - kp)
     ki = p[k.P_KI_SPEED_1] + mix * (p[k.P_KI_SPEED_2] - p[k.P_KI_SPEED_1])
@@ -44,7 +44,7 @@ def _impedance(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _let_go(p, s):  # type: ignore[no-untyped-def]
-    """Without the power stage: nothing is commanded, and no controller remembers anything."""
+    """Reset commands and controllers while the power stage is off."""
     s[k.S_INTEGRAL] = 0.0
     s[k.S_FF_SPEED] = 0.0
     s[k.S_FF_TORQUE] = 0.0
@@ -63,7 +63,7 @@ def _let_go(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _position_controller(p, s, mix, third):  # type: ignore[no-untyped-def]
-    """Speed reference of the position loop with its feed-forward."""
+    """Return the speed reference of the position loop with its feed-forward."""
     shape_command(p, s)
     error = s[k.S_P_DEMAND] - s[k.S_SHAPE] - s[k.S_THETA_FILTERED]
     kp = p[k.P_KP_POSITION_1] + mix * (p[k.P_KP_POSITION_2] - p[k.P_KP_POSITION_1])
@@ -79,7 +79,7 @@ def _position_controller(p, s, mix, third):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _moving_torque(p, s, loop):  # type: ignore[no-untyped-def]
-    """Torque of the position and speed loops, and the integral's increment."""
+    """Return the torque of the position and speed loops, and the integral's increment."""
     mix = select_gains(p, s, loop)
     third = third_share(p, s, loop)
     reference = s[k.S_V_DEMAND]
@@ -100,7 +100,7 @@ def _moving_torque(p, s, loop):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _commanded_torque(p, s, loop):  # type: ignore[no-untyped-def]
-    """Torque of the torque and impedance modes, undone where the speed passes its limit."""
+    """Return the torque of torque and impedance modes, reduced beyond the speed limit."""
     s[k.S_INTEGRAL] = 0.0
     s[k.S_SPEED_REFERENCE] = s[k.S_OMEGA]
     torque = s[k.S_T_DEMAND] if loop == k.LOOP_TORQUE else _impedance(p, s)
@@ -115,7 +115,7 @@ def _commanded_torque(p, s, loop):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _filtered(p, s, torque):  # type: ignore[no-untyped-def]
-    """The torque behind the torque filter and the notches."""
+    """Return the torque after torque filter and notches."""
     share = s[k.S_GAIN_MIX]
     lag = p[k.P_TORQUE_FILTER] + share * (p[k.P_TORQUE_FILTER_2] - p[k.P_TORQUE_FILTER])
     s[k.S_TORQUE_FILTERED] += lag * (torque - s[k.S_TORQUE_FILTERED])
@@ -131,7 +131,7 @@ def _filtered(p, s, torque):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def control(p, s):  # type: ignore[no-untyped-def]
-    """The torque that this step commands, within its limits and what the bus voltage leaves."""
+    """Compute the torque command of this step, limited by its limits and the bus voltage."""
     loop = int(p[k.P_LOOP])
     if loop == k.LOOP_OFF:
         _let_go(p, s)
@@ -143,7 +143,7 @@ def control(p, s):  # type: ignore[no-untyped-def]
     else:
         torque = _commanded_torque(p, s, loop)
     torque = _filtered(p, s, torque)
-    # The voltage that the bus leaves over limits the current at speed.
+    # The remaining bus voltage limits the current at speed.
     emf = p[k.P_KT] * s[k.S_OMEGA] / 3.0
     room = s[k.S_VOLTAGE] * p[k.P_POWER_LIMIT_V]
     high = min(p[k.P_T_MAX], max(0.0, (room - emf) / p[k.P_RESISTANCE]) * p[k.P_KT])

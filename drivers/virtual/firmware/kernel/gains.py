@@ -1,4 +1,4 @@
-"""Which gains act in this step (004:3061-3096)."""
+"""Selection of the gains in each step (004:3061-3096)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.virtual.firmware.kernel.basics import clamp
 
 @njit(nogil=True)
 def _switch_measure(s, kind):  # type: ignore[no-untyped-def]
-    """The quantity that a gain switching condition compares with its level, SI units."""
+    """Return the quantity that a switching condition compares with its level, SI units."""
     error = abs(s[k.S_P_DEMAND] - s[k.S_THETA])
     if kind == k.SWITCH_TORQUE:
         return abs(s[k.S_TORQUE_COMMAND])
@@ -29,10 +29,10 @@ def _switch_measure(s, kind):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def select_gains(p, s, loop):  # type: ignore[no-untyped-def]
-    """Share of the second gains, 0 to 1.
+    """Return the share of the second gains, 0 to 1.
 
-    To the second gains at once above level + hysteresis, back when the quantity has been below
-    level − hysteresis for the delay.
+    The second gains are selected at once above level + hysteresis, the first again when the
+    quantity has been below level − hysteresis for the delay.
     """
     kind = int(p[k.P_SWITCH_KIND])
     goal = s[k.S_SECOND_GAINS]
@@ -69,7 +69,7 @@ def select_gains(p, s, loop):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def third_share(p, s, loop):  # type: ignore[no-untyped-def]
-    """Share of the third gains, 0 to 1: they hold an axis whose command has stopped."""
+    """Return the share of the third gains, 0 to 1: they hold an axis whose command has stopped."""
     resting = loop == k.LOOP_POSITION and s[k.S_V_DEMAND] == 0.0
     s[k.S_REST_T] = s[k.S_REST_T] + k.STEP_S if resting else 0.0
     on = p[k.P_THIRD_GAINS] > 0.0 and resting and s[k.S_REST_T] >= p[k.P_THIRD_DELAY]

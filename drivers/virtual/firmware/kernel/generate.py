@@ -1,4 +1,4 @@
-"""The command generator: what position, speed and torque are demanded of this step.
+"""The command generator: demanded position, speed and torque of each step.
 
 Linear interpolation over 60C2h: 004:7618-7621.
 """
@@ -27,7 +27,7 @@ def _approach(value, goal, rise, fall):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _held(p, s, towards):  # type: ignore[no-untyped-def]
-    """Whether an active limit switch forbids this direction (sign of ``towards``)."""
+    """Return whether an active limit switch blocks this direction (sign of ``towards``)."""
     held = False
     if p[k.P_LIMIT_STOPS] == k.LIMIT_HOLDS:
         signals = int(s[k.S_SIGNALS])
@@ -48,7 +48,7 @@ def _generate_position(p, s):  # type: ignore[no-untyped-def]
     elif _held(p, s, p[k.P_TARGET] - s[k.S_P_DEMAND]):
         new = _approach(speed, 0.0, 0.0, p[k.P_LIMIT_DEC] * k.STEP_S)
         if new == 0.0:
-            p[k.P_TARGET] = s[k.S_P_DEMAND]  # what lies behind the switch is given up
+            p[k.P_TARGET] = s[k.S_P_DEMAND]  # a target beyond the switch is abandoned
     else:
         distance = p[k.P_TARGET] - s[k.S_P_DEMAND]
         fall = p[k.P_DEC] * k.STEP_S
@@ -125,7 +125,7 @@ def _generate_cyclic(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def generate(p, s):  # type: ignore[no-untyped-def]
-    """Advance the demand by one step, and show when a commanded stop has stopped."""
+    """Advance the demand by one step, and raise EV_STOPPED at the end of a stop."""
     kind = int(p[k.P_GEN])
     if kind == k.GEN_POSITION:
         _generate_position(p, s)
@@ -142,7 +142,7 @@ def generate(p, s):  # type: ignore[no-untyped-def]
             s[k.S_T_DEMAND] += clamp(goal - s[k.S_T_DEMAND], -slope, slope)
             s[k.S_ARRIVED] = 1.0 if s[k.S_T_DEMAND] == goal else 0.0
         else:
-            # The speed controller against zero speed, limited to the braking torque: it does not
+            # The speed controller with zero reference, limited to the braking torque: it does not
             # overshoot as a constant torque would.
             limit = p[k.P_STOP_TORQUE]
             s[k.S_T_DEMAND] = clamp(-p[k.P_KP_SPEED_1] * s[k.S_OMEGA], -limit, limit)

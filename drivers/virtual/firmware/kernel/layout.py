@@ -1,7 +1,7 @@
-"""What every number in the flat arrays of the 50 µs loop is: parameters, state and their codes.
+"""Meaning of every number in the flat arrays of the 50 µs loop: parameters, state and codes.
 
 ``p`` are the parameters, written by the firmware; ``s`` is the state, owned by the loop. SI units
-throughout: rad, rad/s, Nm, A, V, °C. Compiled code holds these indices as constants.
+throughout: rad, rad/s, Nm, A, V, °C. Compiled code contains these indices as constants.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 STEP_S = 50e-6
 STEP_NS = 50_000
 
-# --- what the command generator does -------------------------------------------------------
+# --- kinds of command generation -----------------------------------------------------------
 GEN_OFF, GEN_POSITION, GEN_VELOCITY, GEN_TORQUE, GEN_CYCLIC, GEN_TORQUE_STOP = range(6)
-# --- which loops are closed ----------------------------------------------------------------
+# --- closed loops ----------------------------------------------------------------------------
 LOOP_OFF, LOOP_POSITION, LOOP_SPEED, LOOP_TORQUE, LOOP_IMPEDANCE = range(5)
 # --- events that end a run early, as bits --------------------------------------------------
 EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK, EV_LIMIT = (
@@ -27,13 +27,13 @@ EV_FAULT, EV_STOPPED, EV_ARRIVED, EV_SIGNAL, EV_INDEX, EV_STALL, EV_ALARM_CLOCK,
 # --- switches, as bits of P_SIGNAL_* and S_SIGNALS ------------------------------------------
 SIG_NEGATIVE, SIG_POSITIVE, SIG_HOME = 1, 2, 4
 
-# --- when the second gains act: P_SWITCH_KIND (conditions as M6-L 000:3399, R6L 002:10800) -----
+# --- switching to the second gains: P_SWITCH_KIND (conditions: M6-L 000:3399, R6L 002:10800) ---
 (
     SWITCH_OFF, SWITCH_SMALL_ERROR, SWITCH_INPUT, SWITCH_TORQUE, SWITCH_SPEED_DEMAND,
     SWITCH_SPEED, SWITCH_ACCELERATION, SWITCH_ERROR, SWITCH_COMMANDED, SWITCH_UNFINISHED,
     SWITCH_COMMANDED_OR_FAST,
 ) = range(11)  # fmt: skip
-# --- what a limit switch does: P_LIMIT_STOPS --------------------------------------------------
+# --- action of a limit switch: P_LIMIT_STOPS --------------------------------------------------
 LIMIT_IGNORED, LIMIT_FAULT, LIMIT_HOLDS = range(3)
 
 # --- parameters -----------------------------------------------------------------------------
@@ -122,5 +122,5 @@ ROUGH_STEPS = 8
 S_ROUGH_RING = S_TRACE + TRACE_STEPS + 9
 """Start of the last ROUGH_STEPS torque commands of a rough drive."""
 S_BRAKE_ANCHOR = S_ROUGH_RING + ROUGH_STEPS
-"""Angle at which an elastic holding brake carries nothing."""
+"""Angle at which an elastic holding brake is free of torque."""
 S_SIZE = S_BRAKE_ANCHOR + 1

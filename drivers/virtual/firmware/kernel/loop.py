@@ -1,8 +1,8 @@
 """One compiled function that advances an axis by many steps without the interpreter lock.
 
-A step is demand, control, plant, supply, measurement, protections. Everything it needs travels in
-flat float64 arrays: parameters and state as `layout` says, and the chain's state ``x`` with its
-exact discretisation ``a``, ``b`` (`drivers.virtual.mechanics.chain`).
+A step is demand, control, plant, supply, measurement, protections. All data are in flat float64
+arrays: parameters and state as in `layout`, and the chain's state ``x`` with its exact
+discretisation ``a``, ``b`` (`drivers.virtual.mechanics.chain`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from drivers.virtual.firmware.kernel.supply import supply
 
 
 def sources(folder: Path) -> str:
-    """A digest of all that `run` is compiled from: the Python files of this folder.
+    """Return a digest of all sources of `run`: the Python files of this folder.
 
     Raises:
         OSError: they cannot be read.
@@ -40,22 +40,23 @@ def sources(folder: Path) -> str:
 
 
 def compiled(source_digest: str):  # type: ignore[no-untyped-def]
-    """`run`, kept on disk between starts for just these sources.
+    """Return `run`, cached on disk between starts for exactly these sources.
 
-    numba looks for changes in this file alone, yet the machine code holds every part of the loop
-    and every index of the layout. What a function closes over is part of its key on disk: that is
-    what the digest is for. The parts themselves are not kept, so none of them can be out of date.
+    numba detects changes in this file alone, yet the machine code contains every part of the loop
+    and every index of the layout. Variables in a function's closure are part of its key on disk,
+    which is the purpose of the digest. The parts themselves are not cached, so none can be out of
+    date.
     """
 
     @njit(cache=True, nogil=True)
     def run(  # type: ignore[no-untyped-def]
         steps, p, s, x, a, b, gap_state, half_gap, scratch, random
     ):
-        """Advance by up to ``steps``; ends early after a step that raised a masked event.
+        """Advance by up to ``steps``; end early after a step that raised a masked event.
 
-        The caller clears S_EVENTS. Shapes: p [P_SIZE], s [S_SIZE], x and scratch [n],
-        a [c, n, n], b [c, n, 3 + g], gap_state and half_gap [g], random [1] uint64 (never zero).
-        Returns the steps done.
+        The caller clears S_EVENTS. Shapes: p [P_SIZE], s [S_SIZE], x and scratch [n], a [c, n, n],
+        b [c, n, 3 + g], gap_state and half_gap [g], random [1] uint64 (never zero). Returns the
+        steps done.
         """
         _ = source_digest
         for done in range(steps):

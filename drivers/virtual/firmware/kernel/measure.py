@@ -1,4 +1,4 @@
-"""What the drive sees: encoder, feedback filters (004:3262-3282) and switches."""
+"""Measurements of the drive: encoder, feedback filters (004:3262-3282) and switches."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from drivers.virtual.firmware.kernel.rough_torque import interpolation_error
 
 @njit(nogil=True)
 def _normal(s, random):  # type: ignore[no-untyped-def]
-    """Standard normal by Marsaglia's polar method on xorshift64*, one spare kept."""
+    """Return a standard normal number (Marsaglia's polar method, xorshift64*), one spare kept."""
     if s[k.S_HAS_SPARE] > 0.0:
         s[k.S_HAS_SPARE] = 0.0
         return s[k.S_SPARE_NORMAL]
@@ -42,7 +42,7 @@ def _normal(s, random):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def measure(p, s, x, random):  # type: ignore[no-untyped-def]
-    """Encoder, feedback filters and switches."""
+    """Update encoder, feedback filters and switches."""
     shaft = (x[0] + interpolation_error(p, x[0])) * p[k.P_ENCODER_SENSE]
     counts = shaft * p[k.P_COUNTS_PER_RAD]
     if p[k.P_NOISE] > 0.0:
@@ -56,7 +56,7 @@ def measure(p, s, x, random):  # type: ignore[no-untyped-def]
     raw = (theta - s[k.S_THETA]) / k.STEP_S
     s[k.S_THETA] = theta
     s[k.S_OMEGA_RAW] = raw
-    # A tracking low pass: the filter lags accelerations, not constant speed.
+    # A tracking low-pass: the filter lags accelerations, not constant speed.
     predicted = s[k.S_THETA_FILTERED] + s[k.S_OMEGA_LOW] * k.STEP_S
     s[k.S_THETA_FILTERED] = predicted + p[k.P_POSITION_FILTER] * (theta - predicted)
     s[k.S_OMEGA_LOW] += p[k.P_SPEED_FILTER] * (raw - s[k.S_OMEGA_LOW])

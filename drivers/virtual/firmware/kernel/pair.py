@@ -20,7 +20,7 @@ from drivers.virtual.firmware.kernel.supply import supply
 
 @njit(nogil=True)
 def _command(p, s):  # type: ignore[no-untyped-def]
-    """Setpoints and loops of one drive."""
+    """Compute setpoints and loops of one drive."""
     if s[k.S_ROUGH_WAIT] > 0.0:
         s[k.S_ROUGH_WAIT] -= 1.0
     else:
@@ -31,7 +31,7 @@ def _command(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _rub(p, x, at, b, column, scratch):  # type: ignore[no-untyped-def]
-    """Dry friction of the motor whose states begin at ``at``, by the rule of a single axis."""
+    """Apply dry friction of the motor whose states begin at ``at``, as for a single axis."""
     most = dry_friction(p, x[at : at + 3])
     if most <= 0.0:
         return
@@ -47,7 +47,7 @@ def _rub(p, x, at, b, column, scratch):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _end_stop(p, at, b, column, scratch):  # type: ignore[no-untyped-def]
-    """An inelastic impact of the motor on the end of its travel."""
+    """Apply an inelastic impact of the motor on the end of its travel."""
     over = beyond(p, scratch[at : at + 3], 3)
     if over * scratch[at + 1] > 0.0:
         push = -scratch[at + 1] / b[at + 1, column]
@@ -59,7 +59,7 @@ def _end_stop(p, at, b, column, scratch):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def step_pair(p1, s1, p2, s2, x, a, b, scratch):  # type: ignore[no-untyped-def]
-    """One exact step of both motors and the beam, then friction and end stops of each motor."""
+    """Do one exact step of both motors and the beam, then friction and end stops of each motor."""
     x1, x2 = x[0:3], x[3:6]
     m1 = -opposing(p1, s1, x1) - pull(p1, x1, 3)
     m2 = -opposing(p2, s2, x2) - pull(p2, x2, 3)
@@ -80,7 +80,7 @@ def step_pair(p1, s1, p2, s2, x, a, b, scratch):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _finish(p, s, x, omega, random):  # type: ignore[no-untyped-def]
-    """What one drive makes of its step; True where an event ends the run."""
+    """Update one drive after its step; return True if an event ends the run."""
     rough_report(p, s, x, omega)
     supply(p, s, x)
     measure(p, s, x, random)
@@ -92,13 +92,13 @@ def _finish(p, s, x, omega, random):  # type: ignore[no-untyped-def]
 
 
 def compiled(source_digest: str):  # type: ignore[no-untyped-def]
-    """`run_pair`, kept on disk as `drivers.virtual.firmware.kernel.loop.run` is."""
+    """Return `run_pair`, cached on disk as `drivers.virtual.firmware.kernel.loop.run` is."""
 
     @njit(cache=True, nogil=True)
     def run_pair(  # type: ignore[no-untyped-def]
         steps, p1, s1, random1, p2, s2, random2, x, a, b, scratch
     ):
-        """Advance both by up to ``steps``; ends early after a step with a masked event of one.
+        """Advance both by up to ``steps``; end early after a step with a masked event of one.
 
         Shapes: as `run`, but x and scratch [10], a [10, 10], b [10, 5]. Returns the steps done.
         """

@@ -1,8 +1,8 @@
 """One step of the mechanics: the exact linear chain, then friction and end stops.
 
-Friction is time-stepping on the velocity level (J. J. Moreau, "Unilateral contact and dry
-friction in finite freedom dynamics", 1988): the friction torque of a step is the one that ends it
-at standstill, limited to the Coulomb torque, so nothing chatters.
+Friction is time-stepping on the velocity level (J. J. Moreau, "Unilateral contact and dry friction
+in finite freedom dynamics", 1988): the friction torque of a step is the one that ends it at
+standstill, limited to the Coulomb torque, so that nothing chatters.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from drivers.virtual.firmware.kernel.basics import clamp
 
 @njit(nogil=True)
 def _behind(x, size):  # type: ignore[no-untyped-def]
-    """Angle of the last inertia of the chain, in rad."""
+    """Return the angle of the last inertia of the chain [rad]."""
     behind = x[0]
     for i in range(3, size, 2):
         behind -= x[i]
@@ -26,7 +26,7 @@ def _behind(x, size):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def pull(p, x, size):  # type: ignore[no-untyped-def]
-    """What the load takes of the last inertia: its weight, by its place, and as a fan does."""
+    """Return the load torque on the last inertia: gravity, position-dependent, and fan."""
     torque = p[k.P_GRAVITY]
     if p[k.P_PLACE_NM] != 0.0:
         angle = _behind(x, size) - p[k.P_PLACE_AT]
@@ -39,7 +39,7 @@ def pull(p, x, size):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def beyond(p, x, size):  # type: ignore[no-untyped-def]
-    """How far the last inertia is beyond an end stop, signed."""
+    """Return how far the last inertia is beyond an end stop, signed."""
     behind = _behind(x, size)
     if behind > p[k.P_STOP_MAX]:
         return behind - p[k.P_STOP_MAX]
@@ -50,7 +50,7 @@ def beyond(p, x, size):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _stribeck(p, omega):  # type: ignore[no-untyped-def]
-    """Friction above Coulomb's at this speed."""
+    """Return the friction above Coulomb's at this speed."""
     slow = abs(omega) / p[k.P_STRIBECK]
     if p[k.P_STRIBECK_TANH] > 0.0:
         return p[k.P_STICTION] * (1.0 - math.tanh(slow))
@@ -59,7 +59,7 @@ def _stribeck(p, omega):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _ripple(p, angle):  # type: ignore[no-untyped-def]
-    """Periodic torque that the motor has to make at this angle."""
+    """Return the periodic torque that the motor must produce at this angle."""
     at, cogging = p[k.P_RIPPLE_PHASE], p[k.P_RIPPLE_COGGING_PER_REV]
     torque = p[k.P_RIPPLE_REVOLUTION] * math.sin(angle + at)
     torque += p[k.P_RIPPLE_POLE_PAIR] * math.sin(p[k.P_RIPPLE_POLE_PAIRS] * angle + at)
@@ -69,10 +69,10 @@ def _ripple(p, angle):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _torque_share(p, angle):  # type: ignore[no-untyped-def]
-    """Torque of a wrongly phased motor over what its current would make of it.
+    """Return the torque of a wrongly phased motor relative to that of a correct one.
 
-    The field stands at ±(p·θc + 90°) + an angle (minus: two phases exchanged), θc being what the
-    drive commutates by; the torque is the sine of the electrical angle from rotor to field.
+    The field is at ±(p·θc + 90°) + an angle (minus: two phases exchanged), θc being the angle used
+    for commutation; the torque is the sine of the electrical angle from rotor to field.
     """
     pairs = p[k.P_POLE_PAIRS]
     commutates = pairs * p[k.P_COMMUTATION_SENSE] * angle + 0.5 * math.pi
@@ -81,7 +81,7 @@ def _torque_share(p, angle):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
-    """Torque of a closed brake whose hub twists, and which slips at its holding torque."""
+    """Return the torque of a closed brake: elastic hub, slipping at its holding torque."""
     most, stiffness = p[k.P_BRAKE_TORQUE], p[k.P_BRAKE_STIFFNESS]
     give = most / stiffness
     twist = angle - s[k.S_BRAKE_ANCHOR]
@@ -93,19 +93,19 @@ def _grip(p, s, angle, speed):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _gripped(p):  # type: ignore[no-untyped-def]
-    """Whether a holding brake would be closed."""
+    """Return whether a holding brake would be closed."""
     return int(p[k.P_LOOP]) == k.LOOP_OFF or p[k.P_BRAKE_CLOSED] > 0.0
 
 
 @njit(nogil=True)
 def _elastic(p):  # type: ignore[no-untyped-def]
-    """Whether there is a brake whose hub twists."""
+    """Return whether there is a brake with an elastic hub."""
     return p[k.P_BRAKE_STIFFNESS] > 0.0 and p[k.P_BRAKE_TORQUE] > 0.0
 
 
 @njit(nogil=True)
 def opposing(p, s, x):  # type: ignore[no-untyped-def]
-    """What the motor has to make besides its load: ripple, wrong phases, an elastic brake."""
+    """Return the motor's torque demand besides its load: ripple, wrong phases, elastic brake."""
     torque = _ripple(p, x[0])
     if p[k.P_PHASES_WRONG] > 0.0:
         torque += (1.0 - _torque_share(p, x[0])) * x[2]
@@ -118,7 +118,7 @@ def opposing(p, s, x):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def dry_friction(p, x):  # type: ignore[no-untyped-def]
-    """The most that dry friction takes at the motor, a rigid brake included."""
+    """Return the maximum dry friction at the motor, including a rigid brake."""
     coulomb = p[k.P_COULOMB]
     if p[k.P_STICTION] > 0.0:
         coulomb += _stribeck(p, x[1])
@@ -129,7 +129,7 @@ def dry_friction(p, x):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _load_friction(p, x, scratch, b, last):  # type: ignore[no-untyped-def]
-    """Dry friction of the last inertia, by the same rule as the motor's."""
+    """Apply dry friction of the last inertia, by the same rule as the motor's."""
     most = p[k.P_LOAD_COULOMB]
     needed = -scratch[last] / b[last, 2]
     friction = clamp(needed, -most, most)
@@ -141,7 +141,7 @@ def _load_friction(p, x, scratch, b, last):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-untyped-def]
-    """One exact step of the linear chain, then friction and end stops on the velocity level."""
+    """Do one exact step of the linear chain, then friction and end stops on the velocity level."""
     size = x.shape[0]
     contact = 0
     for g in range(gap_state.shape[0]):
@@ -178,7 +178,7 @@ def step_plant(p, s, x, a, b, gap_state, half_gap, scratch):  # type: ignore[no-
         for i in range(size):
             scratch[i] += bm[i, 2] * push
         scratch[last] = 0.0
-        # What the push over the step did not take back is removed as an inelastic impact.
+        # The remaining penetration is removed as an inelastic impact.
         over = beyond(p, scratch, size)
         if size > 3:
             scratch[size - 2] += over

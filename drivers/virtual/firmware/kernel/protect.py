@@ -10,7 +10,7 @@ from drivers.virtual.firmware.kernel.basics import raise_event
 
 @njit(nogil=True)
 def protect(p, s):  # type: ignore[no-untyped-def]
-    """Latch the faults whose thresholds this step passed."""
+    """Latch the faults whose thresholds were exceeded in this step."""
     faults = 0
     powered = int(p[k.P_LOOP]) != k.LOOP_OFF
     if powered and abs(s[k.S_CURRENT]) * 1.4142135623730951 > p[k.P_OCP_A]:
@@ -67,7 +67,7 @@ def protect(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def monitor(p, s):  # type: ignore[no-untyped-def]
-    """Timers of target reached, zero speed, following error and stall, and the alarm clock."""
+    """Update timers of target reached, zero speed, following error, stall and alarm clock."""
     error = abs(s[k.S_P_DEMAND] - s[k.S_THETA])
     arrived = s[k.S_ARRIVED] > 0.0
     near = arrived and error <= p[k.P_POSITION_WINDOW]

@@ -1,4 +1,4 @@
-"""Rough torque path and machine of the 50 µs loop (`drivers.virtual.mechanics.rough`)."""
+"""Non-ideal torque path and machine of the 50 µs loop (`drivers.virtual.mechanics.rough`)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from drivers.virtual.firmware.kernel import layout as k
 
 @njit(nogil=True)
 def rough_command(p, s):  # type: ignore[no-untyped-def]
-    """What the power stage makes of the torque that the loops command."""
+    """Compute the power stage's actual torque from the torque command of the loops."""
     if p[k.P_ROUGH_ON] == 0.0 or int(p[k.P_LOOP]) == k.LOOP_OFF:
         s[k.S_ROUGH_DEMAND] = s[k.S_TORQUE_COMMAND]
         return
@@ -20,7 +20,7 @@ def rough_command(p, s):  # type: ignore[no-untyped-def]
     if s[k.S_ROUGH_CLOCK] >= period:
         s[k.S_ROUGH_CLOCK] -= period
         s[k.S_ROUGH_HELD] = s[k.S_TORQUE_COMMAND]
-    # Half a period more, as the speed's difference is calculated over one.
+    # Half a period more, as the speed's difference is calculated over one period.
     late = int(0.5 * (period - 1.0) + 0.5)
     step = int(s[k.S_STEP])
     s[k.S_ROUGH_RING + step % k.ROUGH_STEPS] = s[k.S_ROUGH_HELD]
@@ -35,7 +35,7 @@ def rough_command(p, s):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def _dahl(state, omega, limit, rest):  # type: ignore[no-untyped-def]
-    """The next torque of Dahl's friction: a spring of ``limit``/``rest`` that yields."""
+    """Return the next torque of Dahl's friction: a spring of ``limit``/``rest`` that yields."""
     if limit <= 0.0:
         return 0.0
     sign = 1.0 if omega > 0.0 else -1.0
@@ -45,7 +45,7 @@ def _dahl(state, omega, limit, rest):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def rough_machine(p, s, x, b):  # type: ignore[no-untyped-def]
-    """Torques on motor and last inertia for one step, from the state before it."""
+    """Apply torques to motor and last inertia for one step, from the state before it."""
     if p[k.P_ROUGH_ON] == 0.0:
         return
     size = x.shape[0]
@@ -57,7 +57,7 @@ def rough_machine(p, s, x, b):  # type: ignore[no-untyped-def]
     motor = -s[k.S_ROUGH_FRICTION] - s[k.S_ROUGH_DRAG]
     motor -= p[k.P_ROUGH_COG] * math.sin(p[k.P_ROUGH_COG_PER_REV] * angle)
     if p[k.P_ROUGH_INERTIA] > 0.0:
-        # d(Jω)/dt of an inertia that depends on the place, by the acceleration of the last step.
+        # d(Jω)/dt of an inertia that depends on the position, by the acceleration of the last step.
         per = p[k.P_ROUGH_INERTIA_PER_REV]
         motor -= p[k.P_ROUGH_INERTIA] * math.sin(per * angle) * s[k.S_ROUGH_ALPHA]
         motor -= 0.5 * p[k.P_ROUGH_INERTIA] * per * math.cos(per * angle) * omega * omega
@@ -75,7 +75,7 @@ def rough_machine(p, s, x, b):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def rough_report(p, s, x, omega_before):  # type: ignore[no-untyped-def]
-    """6077h as the drive reports it, and the acceleration of this step."""
+    """Update 6077h as the drive reports it, and the acceleration of this step."""
     s[k.S_ROUGH_ALPHA] = (x[1] - omega_before) / k.STEP_S
     if p[k.P_ROUGH_ON] == 0.0:
         s[k.S_TORQUE_REPORTED] = s[k.S_TORQUE]
@@ -88,7 +88,7 @@ def rough_report(p, s, x, omega_before):  # type: ignore[no-untyped-def]
 
 @njit(nogil=True)
 def interpolation_error(p, angle):  # type: ignore[no-untyped-def]
-    """What the encoder reads next to the angle, in rad."""
+    """Return the encoder's interpolation error at this angle [rad]."""
     if p[k.P_ROUGH_ON] == 0.0:
         return 0.0
     return p[k.P_ROUGH_INTERPOLATION] * math.sin(p[k.P_ROUGH_INTERPOLATION_PER_REV] * angle)

@@ -1,4 +1,4 @@
-"""The power side of a step: DC bus, braking resistor, heat and average load."""
+"""Power side of a step: DC bus, braking resistor, temperature and average load."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from drivers.virtual.firmware.kernel import layout as k
 
 @njit(nogil=True)
 def supply(p, s, x):  # type: ignore[no-untyped-def]
-    """DC bus, braking resistor, heat and average load."""
+    """Update DC bus, braking resistor, temperature and average load."""
     current = s[k.S_TORQUE] / p[k.P_KT]
     s[k.S_CURRENT] = current
     copper = 3.0 * p[k.P_RESISTANCE] * current * current
-    # Without the power stage nothing comes to the bus: shorted windings burn the energy themselves.
+    # Without the power stage the bus receives no energy: shorted windings dissipate it themselves.
     power = s[k.S_TORQUE] * x[1] + copper if int(p[k.P_LOOP]) != k.LOOP_OFF else 0.0
     s[k.S_UQ] = p[k.P_RESISTANCE] * current + p[k.P_KT] * x[1] / 3.0
     volts = s[k.S_VOLTAGE]

@@ -63,20 +63,20 @@ def _parser() -> argparse.ArgumentParser:
 def _go_realtime(priority: int) -> None:
     if priority and scheduling.real_time(priority):
         return
-    # Drives answer at once whatever else this computer does.
+    # Drives must answer at once, whatever the load of this computer.
     scheduling.short_slice()
     if priority:
         sys.stderr.write("SCHED_FIFO is not permitted here; running with normal priority\n")
 
 
 def _warm_up(device: Device) -> None:
-    """Let a drive compile its physics before a master waits for it: two milliseconds will do."""
+    """Run the drive for two milliseconds, so that its physics are compiled before use."""
     device.advance(0)
     device.advance(2_000_000)
 
 
 def build(arguments: argparse.Namespace) -> Segment:
-    """Segment with its devices, as the command line says."""
+    """Return a segment with the devices of the command line."""
     axes = axes_of_bench(arguments.bench, arguments.on) if arguments.bench else []
     axes += axes_by_name(arguments.drive, len(axes) + 1)
     if not axes:
@@ -111,7 +111,7 @@ def build(arguments: argparse.Namespace) -> Segment:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Entry point; returns the exit status."""
+    """Run the segment; return the exit status."""
     arguments = _parser().parse_args(argv)
     try:
         segment = build(arguments)

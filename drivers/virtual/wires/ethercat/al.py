@@ -15,24 +15,24 @@ _ALLOWED: dict[AlState, tuple[AlState, ...]] = {
 }
 
 WAIT_NS = 9_000_000_000
-"""How long Safe-Op waits for outputs and SYNC0 (ETG.2000 default time-out of SafeOp to Op)."""
+"""Longest wait in Safe-Op for outputs and SYNC0 (ETG.2000 default time-out SafeOp to Op)."""
 
 
 class Application(Protocol):
-    """What the state machine asks of the slave before and after a step."""
+    """Functions of the slave that the state machine calls before and after a transition."""
 
     def check(self, target: AlState) -> int:
-        """AL status code that forbids ``target``, 0 if nothing does."""
+        """Return the AL status code that forbids ``target``, or 0."""
 
     def waits_for(self, target: AlState) -> int:
-        """0, or while ``target`` must wait for something the code to give if it never comes."""
+        """Return 0, or the code for a time-out while ``target`` must wait for a condition."""
 
     def entered(self, old: AlState, new: AlState, code: int) -> None:
-        """The state has changed; ``code`` is not 0 when an error forced it."""
+        """The state has changed; ``code`` is not 0 if an error caused it."""
 
 
 class AlStateMachine:
-    """State, error flag and code; transitions take ``delay_ns``."""
+    """State, error flag and AL status code; transitions take ``delay_ns``."""
 
     def __init__(self, application: Application) -> None:
         self._application = application
@@ -41,19 +41,19 @@ class AlStateMachine:
         self.code = 0
         self.delay_ns = 0
         self.refusals: dict[AlState, int] = {}
-        """Trouble: target states that are refused, with the code to give."""
+        """Injected fault: target states that are refused, with the AL status code."""
         self._target: AlState | None = None
         self._due_ns = 0
         self._give_up_ns = 0
 
     @property
     def target(self) -> AlState:
-        """Where it is heading; the present state when nothing is pending."""
+        """Requested state, or the present state if no transition is pending."""
         return self.state if self._target is None else self._target
 
     @property
     def due_ns(self) -> int | None:
-        """When a pending step must be checked again."""
+        """Time at which a pending transition is checked again."""
         return None if self._target is None else self._due_ns
 
     @property
@@ -62,15 +62,15 @@ class AlStateMachine:
         return int(self.state) | (ERROR_FLAG if self.error else 0)
 
     def power_on(self) -> None:
-        """Back to Init without an error."""
+        """Return to Init without error."""
         self.state, self.error, self.code, self._target = AlState.INIT, False, 0, None
 
     def request(self, control: int, now_ns: int) -> None:
-        """The master has written ``control`` to 120h."""
+        """Process ``control``, which the master has written to 120h."""
         wanted = control & 0x0F
         acknowledge = bool(control & ERROR_FLAG)
         if self.error and not acknowledge and wanted >= self.state:
-            return  # an error must be acknowledged before the state may rise again
+            return  # an error must be acknowledged before a higher state is accepted
         if acknowledge:
             self.error, self.code = False, 0
         try:
@@ -92,7 +92,7 @@ class AlStateMachine:
             self.run(now_ns)
 
     def run(self, now_ns: int) -> None:
-        """Finish a pending step that is due."""
+        """Complete a pending transition that is due."""
         target = self._target
         if target is None or now_ns < self._due_ns:
             return
@@ -113,13 +113,13 @@ class AlStateMachine:
         self._enter(target, 0)
 
     def retry(self, now_ns: int) -> None:
-        """Something a pending step may be waiting for has happened."""
+        """Check a waiting transition again after a frame."""
         if self._target is not None and self._due_ns == self._give_up_ns:
             self._due_ns = now_ns
             self.run(now_ns)
 
     def fall(self, state: AlState, code: int) -> None:
-        """An error of the running slave: down to ``state`` with the error flag."""
+        """Fall to ``state`` with the error flag set, after an error in operation."""
         self._target = None
         if state < self.state:
             self._enter(state, code)

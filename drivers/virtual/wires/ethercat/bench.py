@@ -15,16 +15,16 @@ from drivers.virtual.mechanics.spec import MechanicsSpec
 from drivers.virtual.wires.ethercat.slave import Slave
 
 DeviceFactory = Callable[[str, MechanicsSpec, Path | None, int], Device]
-"""Family, mechanics, folder of the NVM files, station: to a drive."""
+"""Makes a device from drive family, mechanics, folder of the NVM files and station."""
 
 
 def axes_of_bench(path: Path, url: str | None) -> list[AxisSpec]:
-    """EtherCAT axes of a bench file in the order of the cable.
+    """Return the EtherCAT axes of a bench file in cable order.
 
-    ``url`` chooses one bus; without it the file must have exactly one EtherCAT bus.
+    ``url`` selects one bus; without it the file must have exactly one EtherCAT bus.
 
     Raises:
-        NotAllowed: a wrong file, no such bus, or stations that are not 1…N.
+        NotAllowed: invalid file, unknown bus, or stations other than 1…N.
     """
     bench = load_bench(path)
     urls = bench.urls("ethercat")
@@ -48,11 +48,11 @@ def axes_of_bench(path: Path, url: str | None) -> list[AxisSpec]:
 
 
 def couple(path: Path, axes: Sequence[AxisSpec], devices: Sequence[Device]) -> None:
-    """Put the drives that the bench file has on a common beam on it; none has run yet.
+    """Connect the gantry axes of the bench file to their beams, before any drive has run.
 
     Raises:
-        NotAllowed: a wrong file. ValueError: devices of another factory, which have no shaft to
-            put a beam on.
+        NotAllowed: invalid file.
+        ValueError: devices of another factory, which have no shaft for a beam.
     """
     by_name = {axis.name: device for axis, device in zip(axes, devices, strict=True)}
     for gantry in load_bench(path).gantry:
@@ -65,7 +65,7 @@ def couple(path: Path, axes: Sequence[AxisSpec], devices: Sequence[Device]) -> N
 
 
 def axes_by_name(drives: Sequence[str], first: int) -> list[AxisSpec]:
-    """Drives with the standard mechanics, the first at station ``first``."""
+    """Return drives with the standard mechanics, the first at station ``first``."""
     return [
         AxisSpec(name=f"axis {station}", drive=drive, on="ethercat://virtual0", station=station)
         for station, drive in enumerate(drives, first)
@@ -73,14 +73,14 @@ def axes_by_name(drives: Sequence[str], first: int) -> list[AxisSpec]:
 
 
 def load_factory(spec: str) -> DeviceFactory:
-    """``module:function`` to the function that makes a device."""
+    """Return the device factory for ``module:function``."""
     module, _, name = spec.partition(":")
     factory: DeviceFactory = getattr(importlib.import_module(module), name)
     return factory
 
 
 def load_slave(spec: str) -> type[Slave]:
-    """``module:class`` to the class of the slaves."""
+    """Return the slave class for ``module:class``."""
     module, _, name = spec.partition(":")
     found: type[Slave] = getattr(importlib.import_module(module), name)
     return found

@@ -1,4 +1,4 @@
-"""The wire's time in nanoseconds: real, or in lockstep with the process-data frames."""
+"""The segment's time in nanoseconds: real, or in lockstep with the process-data frames."""
 
 from __future__ import annotations
 
@@ -7,62 +7,61 @@ from typing import Protocol
 
 
 class WireClock(Protocol):
-    """Says when a frame arrived."""
+    """Defines the time at which frames arrive."""
 
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
-        """Time of the frame being handled now; never before the last one.
+        """Return the time of the present frame; never before the last one.
 
-        ``process_data`` distinguishes frames with logical datagrams from all others, ``cycle_ns``
-        is the cycle of the segment (0 while there is none), ``age_ns`` how long ago the kernel saw
-        it.
+        ``process_data`` is True for frames with logical datagrams, ``cycle_ns`` is the cycle of the
+        segment (0 if none is set), ``age_ns`` the time since the kernel received the frame.
         """
 
     def now(self, until_ns: int | None = None) -> int:
-        """Present time without a frame; at most ``until_ns``, where that is given."""
+        """Return the present time without a frame, at most ``until_ns`` if given."""
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """How long until this time of the wire; None where time follows the frames."""
+        """Return the seconds until a segment time; None if time follows the frames."""
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
-        """Where a SYNC0 grid that the master placed at ``start_ns`` really begins."""
+        """Return the actual start of a SYNC0 grid that the master set to ``start_ns``."""
 
 
 class RealClock:
-    """Monotonic time since the segment was switched on."""
+    """Monotonic time since the segment was started."""
 
     def __init__(self) -> None:
         self._start = time.monotonic_ns()
         self._last = 0
 
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
-        """Arrival by the kernel's time stamp, so that our own scheduling does not matter."""
+        """Return the kernel's receive time, so that our own scheduling has no effect."""
         del process_data, cycle_ns
         self._last = max(self._last, time.monotonic_ns() - self._start - age_ns)
         return self._last
 
     def now(self, until_ns: int | None = None) -> int:
-        """Present time."""
+        """Return the present time."""
         present = time.monotonic_ns() - self._start
         self._last = max(self._last, present if until_ns is None else min(present, until_ns))
         return self._last
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """From now."""
+        """Return the seconds from now."""
         return (wire_ns + self._start - time.monotonic_ns()) * 1e-9
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
-        """Where the master placed it."""
+        """Return the master's start time."""
         del cycle_ns
         return start_ns
 
 
 class LockstepClock:
-    """One cycle per process-data frame, however fast or slow they come; deterministic.
+    """One cycle per process-data frame, independent of the real frame rate; deterministic.
 
-    Process-data frames arrive in the middle of cycles, on the grid (n + ½)·cycle. Every other
-    frame takes ``frame_ns``, so that there is room for mailbox work between two cycles; when
-    `IDLE_FRAMES` have come without process data, each takes ``idle_frame_ns``, so that polling
-    for an answer or a state makes time pass.
+    Process-data frames arrive in the middle of cycles, on the grid (n + ½)·cycle. Every other frame
+    takes ``frame_ns``, so that mailbox transfers fit between two cycles; after `IDLE_FRAMES` frames
+    without process data, each takes ``idle_frame_ns``, so that time passes while the master polls
+    for an answer or a state.
     """
 
     IDLE_FRAMES = 40
@@ -80,7 +79,7 @@ class LockstepClock:
         self._others = self.IDLE_FRAMES
 
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
-        """Next half-cycle for process data, a little later for anything else."""
+        """Return the next half cycle for process data, otherwise a little later."""
         del age_ns
         if process_data:
             cycle = cycle_ns or self.cycle_ns
@@ -93,26 +92,26 @@ class LockstepClock:
         return self._now
 
     def now(self, until_ns: int | None = None) -> int:
-        """Time of the last frame."""
+        """Return the time of the last frame."""
         del until_ns
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Unknown."""
+        """Return None: unknown."""
         del wire_ns
         return None
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
-        """The next whole multiple of the cycle: the master's own clock must not matter here."""
+        """Return the next multiple of the cycle: the master's own clock must have no effect."""
         return -(-start_ns // cycle_ns) * cycle_ns
 
 
 class SteadyClock:
-    """Real time while no process data flow, and one cycle per frame while they do.
+    """Real time without process data, and one cycle per frame with process data.
 
-    For drives and a master that share a busy computer: a cycle that comes late for lack of
-    processor time is then not late for the drives, and measurements are as on a quiet bus. When
-    the frames end, real time goes on after `SILENT_NS`, so that watchdogs work.
+    For drives and a master on one busy computer: a cycle that is late for lack of processor time is
+    then not late for the drives, and measurements are as on a bus without load. When the frames
+    stop, real time continues after `SILENT_NS`, so that watchdogs work.
     """
 
     SILENT_NS = 200_000_000
@@ -131,7 +130,7 @@ class SteadyClock:
         return self._last_cyclic is not None and real - self._last_cyclic < self.SILENT_NS
 
     def arrival(self, process_data: bool, cycle_ns: int, age_ns: int = 0) -> int:
-        """Middle of the next cycle for process data of a synchronised segment."""
+        """Return the middle of the next cycle for process data of a synchronised segment."""
         real = self._real()
         flowing = self._flowing(real)
         if process_data and cycle_ns:
@@ -145,7 +144,7 @@ class SteadyClock:
         return self._now
 
     def now(self, until_ns: int | None = None) -> int:
-        """Time of the last frame while process data flow, else real time from there on."""
+        """Return the last frame's time during process data, otherwise real time from there on."""
         del until_ns
         real = self._real()
         if not self._flowing(real):
@@ -153,10 +152,10 @@ class SteadyClock:
         return self._now
 
     def ahead_s(self, wire_ns: int) -> float | None:
-        """Unknown while process data flow, and without them there is nothing to wait for."""
+        """Return None: time follows the frames, or no pulse is expected."""
         del wire_ns
         return None
 
     def grid(self, start_ns: int, cycle_ns: int) -> int:
-        """The next whole multiple of the cycle."""
+        """Return the next multiple of the cycle."""
         return -(-start_ns // cycle_ns) * cycle_ns

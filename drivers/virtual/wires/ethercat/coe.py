@@ -1,7 +1,7 @@
 """CoE server: SDO transfers, complete access, SDO information, emergencies (ETG.1000.6 5.6).
 
-Pure: a request's bytes go in (behind the mailbox header), answers come out. It keeps the state
-of one segmented transfer, as one channel has only one.
+Without I/O: takes a request's bytes (after the mailbox header) and returns the answers. It stores
+the state of one segmented transfer; a channel has only one.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ class MailboxError(Exception):
 
 @dataclass(slots=True)
 class Oddities:
-    """Behaviour of real slaves that do not keep to the standard; all off by default."""
+    """Deviations of real slaves from the standard; all off by default."""
 
     unpadded_count: bool = False
-    """Complete access without the pad byte behind subindex 0."""
+    """Complete access without the pad byte after subindex 0."""
     abort_command: int = _ABORT_COMMAND
-    """Command byte of an abort; some slaves set more than the three bits that count."""
+    """Command byte of an abort; some slaves set more than the three relevant bits."""
     endless_segments: bool = False
-    """Segmented uploads go on after the announced size, never marking the last segment."""
+    """Segmented uploads continue beyond the announced size and mark no segment as last."""
 
 
 @dataclass(slots=True)
 class _Transfer:
-    """A segmented transfer under way."""
+    """A segmented transfer in progress."""
 
     index: int
     subindex: int
@@ -66,7 +66,7 @@ class _Transfer:
 
 
 class CoeServer:
-    """One server per slave; ``capacity`` is the payload of one mailbox in bytes."""
+    """CoE server of one slave; ``capacity`` is the payload of one mailbox in bytes."""
 
     def __init__(self, dictionary: CoeDictionary, complete_access: bool, capacity: int) -> None:
         self._dictionary = dictionary
@@ -75,17 +75,17 @@ class CoeServer:
         self._transfer: _Transfer | None = None
         self.oddities = Oddities()
         self.segments_answered = 0
-        """Segments of the running or last segmented transfer, for injected trouble."""
+        """Segments of the present or last segmented transfer, for injected faults."""
 
     def reset(self) -> None:
-        """Forget a transfer that was under way."""
+        """Discard a transfer in progress."""
         self._transfer = None
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Answers to one request, in order; none for an abort from the master.
+        """Return the answers to one request, in order; none for an abort from the master.
 
         Raises:
-            MailboxError: not a CoE service that this slave has.
+            MailboxError: not a CoE service of this slave.
         """
         if len(payload) < 3:
             raise MailboxError(MAILBOX_SHORT)
@@ -100,7 +100,7 @@ class CoeServer:
 
     @staticmethod
     def emergency(code: int, register: int, data: bytes) -> bytes:
-        """An emergency message (ETG.1000.6 clause 5.6.4)."""
+        """Return an emergency message (ETG.1000.6 clause 5.6.4)."""
         return _header(_EMERGENCY) + struct.pack("<HB", code, register) + data[:5].ljust(5, b"\0")
 
     def _sdo(self, body: bytes) -> list[bytes]:
@@ -233,7 +233,7 @@ class CoeServer:
         return [s for s in self._dictionary.subindices(index) if s >= subindex]
 
     def _read_all(self, index: int, first: int) -> bytes:
-        """Complete access: subindex 0 padded to 16 bits, the rest packed as it lies in a PDO."""
+        """Complete access: subindex 0 padded to 16 bits, the rest packed as in a PDO."""
         entries = self._entries(index, first)
         if self._dictionary.is_list(index):
             count = int.from_bytes(self._dictionary.read(index, 0), "little")
@@ -253,7 +253,7 @@ class CoeServer:
         return packed.data()
 
     def _write_all(self, index: int, first: int, data: bytes) -> None:
-        """Complete access download. A list is cleared, filled, and counted last."""
+        """Complete access download. A list is cleared, then written, its count last."""
         entries = self._entries(index, first)
         source = _BitReader(data)
         count: bytes | None = None
@@ -285,7 +285,7 @@ def _differs(left: bytes, right: bytes) -> bool:
 
 
 class _BitWriter:
-    """Packs values bit by bit; values of a byte or more start on a byte."""
+    """Packs values bit by bit; values of a byte or more start at a byte boundary."""
 
     def __init__(self) -> None:
         self._value = 0
@@ -303,7 +303,7 @@ class _BitWriter:
 
 
 class _BitReader:
-    """The reverse of `_BitWriter`."""
+    """Reverse of `_BitWriter`."""
 
     def __init__(self, data: bytes) -> None:
         self._value = int.from_bytes(data, "little")

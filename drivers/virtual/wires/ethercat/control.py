@@ -1,8 +1,8 @@
 """Control channel of a running segment: one JSON object per line, one answer per line.
 
 ``{"id": 1, "do": "cut", "cable": 2}`` is answered by ``{"id": 1, "ok": true, "result": …}`` or
-``{"id": 1, "ok": false, "error": "…"}``. Slaves are counted from 0, cable k leads to slave k.
-Times are in seconds.
+``{"id": 1, "ok": false, "error": "…"}``. Slaves are counted from 0, cable k leads to slave k. Times
+are in seconds.
 """
 
 from __future__ import annotations
@@ -72,18 +72,18 @@ class Control:
         }
 
     def ready(self) -> None:
-        """Report that frames are answered from now on."""
+        """Report that frames are processed from now on."""
         self._send({"ready": True, "interface": self._interface, **self._state()})
 
     def feed(self, data: bytes) -> None:
-        """Bytes from the channel; complete lines are executed."""
+        """Take bytes from the channel; complete lines are executed."""
         *lines, self._rest = (self._rest + data).split(b"\n")
         for line in lines:
             if line.strip():
                 self._send(self.execute(line))
 
     def execute(self, line: bytes) -> dict[str, object]:
-        """One command line to its answer."""
+        """Execute one command line and return the answer."""
         identifier: object = None
         try:
             request = dict(json.loads(line))
@@ -182,7 +182,7 @@ class Control:
         self._show_carrier()
 
     def _show_carrier(self) -> None:
-        """The master's interface loses its carrier with the first cable."""
+        """Set the carrier of the master's interface as the first cable is connected or not."""
         if self._carrier is not None:
             self._carrier(not self._segment.line.is_cut(0))
 
@@ -227,11 +227,11 @@ class Control:
         self._slave(slave).controller.eeprom.busy_until_ns = until
 
     def _eeprom_cut(self, slave: int, after_words: int) -> None:
-        """The supply of the EEPROM fails while a word is stored, until the next power cycle."""
+        """Fail the EEPROM supply while a word is stored, until the next power cycle."""
         self._slave(slave).controller.eeprom.cut_after = after_words
 
     def _eeprom(self, slave: int, word: int | None = None, data: str = "") -> dict[str, object]:
-        """The contents, past the wire; with ``word`` and ``data`` they are changed first."""
+        """Return the EEPROM content; ``word`` and ``data`` change it first."""
         eeprom = self._slave(slave).controller.eeprom
         if word is not None:
             changed = bytes.fromhex(data)
@@ -260,20 +260,20 @@ class Control:
         abort_command: int = 0x80,
         endless_segments: bool = False,
     ) -> None:
-        """Behave like slaves that do not keep to the standard; without arguments, keep to it."""
+        """Deviate from the standard as given; without arguments, follow it."""
         self._slave(slave).coe.oddities = Oddities(
             unpadded_count, abort_command & 0xFF, endless_segments
         )
 
     def _firmware(self, slave: int, **trouble: Any) -> None:
-        """Trouble while firmware is loaded, see `FileTrouble`; without arguments, none."""
+        """Inject faults into firmware downloads, see `FileTrouble`; without arguments, none."""
         store = self._slave(slave).files
         if store is None:
             raise ValueError(f"slave {slave} takes no files")
         store.trouble = FileTrouble(**trouble)
 
     def _files(self, slave: int) -> dict[str, str]:
-        """Names of the files that came whole, and their SHA-256."""
+        """Return names and SHA-256 of the completely received files."""
         store = self._slave(slave).files
         kept = {} if store is None else store.files
         return {name: hashlib.sha256(data).hexdigest() for name, data in kept.items()}
@@ -283,12 +283,12 @@ class Control:
         self._slave(slave).device.inject(what, value)
 
     def _read(self, slave: int, index: int, subindex: int = 0) -> str:
-        """The drive's own value, past the wire: the truth that tests compare with."""
+        """Return the drive's own value, bypassing the bus, as reference for tests."""
         self._segment.settle()
         return self._slave(slave).dictionary.read(index, subindex).hex()
 
     def _shaft(self, slave: int) -> float:
-        """The shaft's angle in revolutions, past every wire and unit."""
+        """Return the shaft angle in revolutions, independent of bus and units."""
         self._segment.settle()
         return shaft_rev(self._slave(slave).device)
 

@@ -1,6 +1,6 @@
-"""The slave controller: register memory, sync managers, FMMUs and the rules of access to them.
+"""The slave controller: register memory, sync managers, FMMUs and their access rules.
 
-It has no time of its own and no drive; what a write sets off is commanded to `ControllerEvents`.
+It has no clock and no drive; the effects of a write are reported to `ControllerEvents`.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _WRITABLE = _writable_mask()
 
 
 class _Reach(NamedTuple):
-    """What of one slave a logical datagram reaches: bytes to write and to read, and single bits.
+    """What a logical datagram reaches in one slave: bytes to write, bytes to read, single bits.
 
-    A pair of bytes is the place in the datagram and the physical address.
+    Byte pairs are (position in the datagram, physical address).
     """
 
     writes: tuple[tuple[slice, int], ...]
@@ -43,7 +43,7 @@ class _Reach(NamedTuple):
 
 
 class ControllerEvents(Protocol):
-    """What the slave behind the controller must react to."""
+    """Events of the controller to which the slave must react."""
 
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""
@@ -68,7 +68,7 @@ class Controller:
         """Process-data watchdog time, 0 while it is switched off."""
         self.watchdog_expired = False
         self.neighbours = (0, 0)
-        """How many slaves lie before and behind this one on the working part of the line."""
+        """Number of slaves before and after this one on the working part of the line."""
         self._events = events
         self._dc = dc
         self._fmmus: list[Fmmu] = []
@@ -76,7 +76,7 @@ class Controller:
         self._active: list[SyncManager] = []
 
     def power_on(self, has_dc: bool) -> None:
-        """Registers as after power-on (defaults of ETG.1000.4 and of common controllers)."""
+        """Set the registers to power-on values (defaults of ETG.1000.4 and common controllers)."""
         memory = self.memory
         memory[:] = bytes(len(memory))
         self.eeprom.power_on()
@@ -101,25 +101,25 @@ class Controller:
         self._reaches.clear()
         self._has_dc = has_dc
 
-    # -- what the slave shows -------------------------------------------------------------------
+    # -- registers set by the slave -------------------------------------------------------------
 
     def show_state(self, status: int, code: int) -> None:
-        """AL status and its code."""
+        """Set AL status and AL status code."""
         self.memory[reg.AL_STATUS] = status
         struct.pack_into("<H", self.memory, reg.AL_STATUS_CODE, code)
 
     def show_sync_managers(self) -> None:
-        """Status bytes of all sync managers."""
+        """Set the status bytes of all sync managers."""
         for sm in self.sms:
             self._show(sm)
 
     def show_mailbox(self) -> None:
-        """Status bytes of the two mailbox channels."""
+        """Set the status bytes of the two mailbox channels."""
         self._show(self.sms[0])
         self._show(self.sms[1])
 
     def count(self, register: int) -> None:
-        """Raise an 8-bit error counter, which stops at its end."""
+        """Increment an 8-bit error counter, which stops at 255."""
         self.memory[register] = min(255, self.memory[register] + 1)
 
     def _show(self, sm: SyncManager) -> None:
@@ -134,7 +134,7 @@ class Controller:
         return self.memory[0x10] | self.memory[0x11] << 8
 
     def answers_to(self, address: int) -> bool:
-        """Station address, or alias where the master has switched that on."""
+        """Whether ``address`` is the station address, or the alias if the master has enabled it."""
         if self.station == address:
             return True
         if not self.memory[reg.DL_ALIAS_ENABLE] & 1:
@@ -142,7 +142,7 @@ class Controller:
         return address == int(struct.unpack_from("<H", self.memory, reg.STATION_ALIAS)[0])
 
     def read(self, address: int, length: int, now_ns: int) -> bytes | None:
-        """Physical read; None leaves datagram and working counter alone."""
+        """Read physical memory; None leaves datagram and working counter unchanged."""
         end = address + length
         if address < reg.RAM:
             self._refresh(address, end, now_ns)
@@ -156,7 +156,7 @@ class Controller:
         return bytes(self.memory[address:end]).ljust(length, b"\0")
 
     def _refresh(self, address: int, end: int, now_ns: int) -> None:
-        """Put values that change by themselves into the registers about to be read."""
+        """Update registers with changing values before they are read."""
         if address < reg.EEPROM_ADDRESS and end > reg.EEPROM_CONTROL:
             status = self.eeprom.status(now_ns)
             struct.pack_into("<H", self.memory, reg.EEPROM_CONTROL, status)
@@ -166,7 +166,7 @@ class Controller:
             self._dc.refresh(now_ns)
 
     def write(self, address: int, data: bytes, now_ns: int) -> bool:
-        """Physical write; False leaves the working counter alone."""
+        """Write physical memory; False leaves the working counter unchanged."""
         if address < reg.RAM:
             self._write_registers(address, data, now_ns)
             return True
@@ -202,7 +202,7 @@ class Controller:
             self._diagnosis_written(address, end)
 
     def _diagnosis_written(self, address: int, end: int) -> None:
-        """A write to any of a group of error counters clears the group."""
+        """A write to any error counter of a group clears the group."""
         for start, stop in (
             (reg.RX_ERRORS, reg.PROCESSING_ERRORS),
             (reg.PROCESSING_ERRORS, reg.PROCESSING_ERRORS + 1),
@@ -215,7 +215,7 @@ class Controller:
             self._set_watchdog()
 
     def _set_watchdog(self) -> None:
-        """Divider counts 40 ns steps and adds two (ETG.1000.4 table 35)."""
+        """The divider counts 40 ns steps and adds two (ETG.1000.4 table 35)."""
         divider, count = (
             struct.unpack_from("<H", self.memory, at)[0]
             for at in (reg.WATCHDOG_DIVIDER, reg.WATCHDOG_PROCESS_DATA)
@@ -223,7 +223,7 @@ class Controller:
         self.watchdog_ns = int((divider + 2) * 40 * count)
 
     def _eeprom_written(self, address: int, data: bytes, now_ns: int) -> None:
-        """Only the side that 500h bit 0 names may use the interface."""
+        """Only the side selected by 500h bit 0 may use the interface."""
         if self.memory[reg.EEPROM_CONFIG] & 1:
             return
         end = address + len(data)
@@ -277,9 +277,9 @@ class Controller:
     def logical(
         self, address: int, data: bytearray, reading: bool, writing: bool, now_ns: int
     ) -> tuple[bool, bool]:
-        """One logical datagram; returns whether something was read and written.
+        """Process one logical datagram; return whether something was read and written.
 
-        Writes take the bytes as they came in; only then are inputs put into ``data``.
+        Writes take the received bytes; inputs are put into ``data`` after that.
         """
         reach = self._reaches.get((address, len(data)))
         if reach is None:
@@ -301,7 +301,7 @@ class Controller:
         return read, wrote
 
     def _reach(self, address: int, length: int) -> _Reach:
-        """What a logical datagram reaches here, worked out once for all its cycles."""
+        """Return what a logical datagram reaches here, calculated once for all cycles."""
         end = address + length
         meant = [f for f in self._fmmus if f.start < end and f.end > address]
 
@@ -332,7 +332,7 @@ class Controller:
         return done
 
     def _stored(self, address: int) -> int:
-        """A byte as it lies there, without the rules of reading."""
+        """Return a stored byte, without the rules for reading."""
         for sm in self._active:
             if sm.start <= address < sm.end:
                 return sm.data[address - sm.start]

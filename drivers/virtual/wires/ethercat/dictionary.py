@@ -1,8 +1,8 @@
-"""The object dictionary as CoE shows it: the drive's own objects under those of the network.
+"""The object dictionary for CoE: the network's objects, then the drive's own objects.
 
-The wire owns what only the network state knows (ETG.1000.6 clause 5.6.7, ETG.1020): sync manager
-types 1C00h, PDO assignment 1C12h/1C13h, PDO mapping 16xxh/1Axxh (writable in Pre-Op only,
-004:1131-1145) and synchronisation 1C32h/1C33h. Everything else is the drive's.
+The slave holds what only the network state determines (ETG.1000.6 clause 5.6.7, ETG.1020): sync
+manager types 1C00h, PDO assignment 1C12h/1C13h, PDO mapping 16xxh/1Axxh (writable in Pre-Op only,
+004:1131-1145) and synchronisation 1C32h/1C33h. All other objects are the drive's.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ from drivers.virtual.wires.ethercat.registers import AlState
 from profiles.schema import DataType, Parameter, PdoPart
 
 ABORT_COUNT_NOT_ZERO = 0x06010003
-"""Subindex cannot be written, subindex 0 must be 0 for it (ETG.1000.6 table 40)."""
+"""Subindex cannot be written unless subindex 0 is 0 (ETG.1000.6 table 40)."""
 
 _BITS: dict[DataType, int] = {"UINT8": 8, "UINT16": 16, "UINT32": 32}
 
 
 @dataclass(slots=True)
 class SyncReport:
-    """What 1C32h/1C33h report of the synchronisation; the process data keep it up to date."""
+    """Synchronisation values in 1C32h/1C33h; the process data update them."""
 
     mode: int = 0
-    """0 free run, 1 with the sync manager event, 2 with SYNC0, 3 with SYNC1 (ETG.1020 table 59)."""
+    """0 free run, 1 sync manager event, 2 SYNC0, 3 SYNC1 (ETG.1020 table 59)."""
     cycle_ns: int = 0
     missed: int = 0
-    """SYNC0 events that found no new outputs, since Op."""
+    """SYNC0 events without new outputs, since Op."""
 
 
 class NetworkObject:
-    """One list object: subindex 0 counts, the others hold unsigned numbers of one type.
+    """One list object: subindex 0 is the count, the others are unsigned numbers of one type.
 
-    Where the drive has the object in its own dictionary, the values live there, so that the
-    drive's save and restore cover them; otherwise they live here.
+    If the drive's own dictionary has the object, the values are stored there, so that the drive's
+    save and restore include them; otherwise they are stored here.
     """
 
     def __init__(
@@ -65,19 +65,19 @@ class NetworkObject:
             self.slots = max(device.subindices(index))
 
     def type_of(self, subindex: int) -> DataType:
-        """Type of an entry. Raises SdoAbort for one that does not exist."""
+        """Return the type of an entry. Raises SdoAbort if it does not exist."""
         if subindex > self.slots:
             raise SdoAbort(ABORT_NO_SUBINDEX)
         return self.kind if subindex else self.count_type
 
     def get(self, subindex: int) -> int:
-        """Value of an entry."""
+        """Return the value of an entry."""
         if self._device is not None:
             return int.from_bytes(self._device.read(self._index, subindex), "little")
         return self._values[subindex]
 
     def put(self, subindex: int, value: int) -> None:
-        """Store a checked value; the drive may still refuse."""
+        """Store a checked value; the drive may still refuse it."""
         if self._device is not None:
             size = _BITS[self.type_of(subindex)] // 8
             self._device.write(self._index, subindex, value.to_bytes(size, "little"))
@@ -85,7 +85,7 @@ class NetworkObject:
             self._values[subindex] = value
 
     def active(self) -> tuple[int, ...]:
-        """Values within the count."""
+        """Return the values within the count."""
         return tuple(self.get(n) for n in range(1, min(self.get(0), self.slots) + 1))
 
 
@@ -107,7 +107,7 @@ class CoeDictionary:
         self.reset()
 
     def reset(self) -> None:
-        """Power-on: what the drive does not keep itself is as the profile prints it."""
+        """Set values that the drive does not store to the profile's defaults."""
         device = self._device
         pdo = device.profile.pdo
         objects = {0x1C00: NetworkObject(device, 0x1C00, _SM_TYPES, "UINT8", (1, 2, 3, 4))}
@@ -128,39 +128,39 @@ class CoeDictionary:
         self._objects = objects
 
     def mapping_word(self, key: str) -> int:
-        """Profile key to the 32-bit mapping entry."""
+        """Return the 32-bit mapping entry of a profile key."""
         index, subindex = int(key[:4], 16), int(key[5:], 16)
         return index << 16 | subindex << 8 | self._device.entry(index, subindex).bit_length
 
     def _part_word(self, part: PdoPart) -> int:
-        """Mapping entry of a stretch; padding has index 0 (ETG.2000 clause 6.10)."""
+        """Return the mapping entry of a part; padding has index 0 (ETG.2000 clause 6.10)."""
         return part.bits if part.key is None else self.mapping_word(part.key) & ~0xFF | part.bits
 
     def mapping(self, pdo_index: int) -> tuple[int, ...]:
-        """Active entries of one mapping object."""
+        """Return the active entries of one mapping object."""
         found = self._objects.get(pdo_index)
         return found.active() if found else ()
 
     def assigned(self, direction: str) -> tuple[int, ...]:
-        """All mapping entries of the PDOs that are assigned in one direction."""
+        """Return all mapping entries of the PDOs assigned in one direction."""
         found = self._objects.get(0x1C12 if direction == "rx" else 0x1C13)
         pdos = found.active() if found else ()
         return tuple(entry for pdo in pdos for entry in self.mapping(pdo))
 
     def assigned_pdos(self, direction: str) -> tuple[int, ...]:
-        """Indices of the PDOs that are assigned in one direction."""
+        """Return the indices of the PDOs assigned in one direction."""
         found = self._objects.get(0x1C12 if direction == "rx" else 0x1C13)
         return found.active() if found else ()
 
-    # -- what the CoE server asks ---------------------------------------------------------------
+    # -- access by the CoE server ----------------------------------------------------------------
 
     def indices(self) -> list[int]:
-        """All objects, ascending."""
+        """Return the indices of all objects, ascending."""
         own = set(self._objects) | (set() if not self._has_sync() else {0x1C32, 0x1C33})
         return sorted(own | set(self._device.indices()))
 
     def subindices(self, index: int) -> list[int]:
-        """All subindices of one object, ascending."""
+        """Return all subindices of one object, ascending."""
         if (found := self._objects.get(index)) is not None:
             return list(range(found.slots + 1))
         if index in (0x1C32, 0x1C33) and self._has_sync():
@@ -168,23 +168,23 @@ class CoeDictionary:
         return sorted(self._device.subindices(index))
 
     def is_list(self, index: int) -> bool:
-        """Objects whose length follows their own subindex 0 in complete access."""
+        """Whether complete access uses the object's own subindex 0 as its length."""
         return index in self._objects
 
     def object_name(self, index: int) -> str:
-        """Name of the whole object: that of its first entry, which stands for it."""
+        """Return the name of the object: that of its first entry."""
         if (found := self._objects.get(index)) is not None:
             return found.name
         return self.entry(index, self.subindices(index)[0]).name
 
     def parameter(self, index: int, subindex: int) -> Parameter | None:
-        """What the profile prints of an entry of the drive; None for the network's own."""
+        """Return the profile's data of a drive entry; None for network objects."""
         if index in self._objects:
             return None
         return self._device.profile.by_key.get(f"{index:04X}:{subindex:02X}")
 
     def entry(self, index: int, subindex: int) -> EntryInfo:
-        """Description of one entry."""
+        """Return the description of one entry."""
         if (found := self._objects.get(index)) is not None:
             kind = found.type_of(subindex)
             writable = index != 0x1C00 and index not in self._fixed
@@ -200,7 +200,7 @@ class CoeDictionary:
         return self._device.entry(index, subindex)
 
     def read(self, index: int, subindex: int) -> bytes:
-        """Value of one entry."""
+        """Return the value of one entry."""
         if (found := self._objects.get(index)) is not None:
             size = _BITS[found.type_of(subindex)] // 8
             return found.get(subindex).to_bytes(size, "little")
@@ -249,7 +249,7 @@ class CoeDictionary:
             raise SdoAbort(ABORT_DEVICE_STATE)
         if len(data) > size:
             raise SdoAbort(ABORT_TOO_LONG)
-        # A count printed as UINT16 (004:1437) is also accepted in the standard's 8 bits.
+        # A count listed as UINT16 (004:1437) is also accepted in the standard's 8 bits.
         if len(data) < size and subindex:
             raise SdoAbort(ABORT_TOO_SHORT)
         value = int.from_bytes(data, "little")

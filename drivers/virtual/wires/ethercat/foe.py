@@ -1,7 +1,7 @@
-"""File access over EtherCAT, server side (ETG.1000.6 clause 5.8): firmware files in and out.
+"""File access over EtherCAT, server side (ETG.1000.6 clause 5.8): firmware upload and download.
 
-In BOOT the drive's own program is erased when a download begins: what breaks off leaves a drive
-that goes no further than INIT and BOOT. In Pre-Op the file is kept aside until it is whole.
+In BOOT the drive's program is erased when a download starts: after an interrupted download the
+drive accepts only INIT and BOOT. In Pre-Op the file is held separately until it is complete.
 """
 
 from __future__ import annotations
@@ -16,28 +16,28 @@ _HEADER = 6
 
 @dataclass(slots=True)
 class FileTrouble:
-    """What a drive's file service may do instead of taking a file; nothing by default."""
+    """Faults to inject into the file service; none by default."""
 
     refuse: int = 0
-    """Error code for every request to write."""
+    """Error code for every write request."""
     fail_at: int | None = None
-    """Byte at which writing the memory fails…"""
+    """Byte at which writing to memory fails…"""
     code: int = 0x8011
     """…with this error code."""
     text: str = ""
     busy: int = 0
-    """How often each packet is answered by "busy" before it is taken."""
+    """Number of "busy" answers before each packet is accepted."""
     boot_only: bool = False
-    """Files are accepted in BOOT only."""
+    """Accept files in BOOT only."""
 
 
 class FirmwareStore:
-    """Keeps what was downloaded."""
+    """Stores downloaded files."""
 
     def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
         self.intact = True
-        """The drive has a whole program to run."""
+        """The drive has a complete program."""
         self.trouble = FileTrouble()
         self._boot = False
         self._room = 0
@@ -48,13 +48,13 @@ class FirmwareStore:
         self._busy_left = 0
 
     def enter(self, capacity: int, *, boot: bool) -> None:
-        """A mailbox with ``capacity`` bytes of payload opens, in BOOT or above."""
+        """Open a mailbox with ``capacity`` bytes of payload, in BOOT or above."""
         self._room = capacity - _HEADER
         self._boot = boot
         self._name, self._writing = None, False
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Answers to one FoE message."""
+        """Return the answers to one FoE message."""
         code = payload[0] if payload else 0
         number = struct.unpack_from("<I", payload.ljust(_HEADER, b"\0"), 2)[0]
         rest = payload[_HEADER:]

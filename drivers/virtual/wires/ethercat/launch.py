@@ -1,4 +1,4 @@
-"""Start a virtual segment as a process of its own and talk to it."""
+"""Start a virtual segment as a separate process and use its control channel."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from drivers.errors import LinkLost, LinkTimeout
 from drivers.virtual.wires.netns import Namespace, child_environment
 
 START_TIMEOUT_S = 180.0
-"""Devices may have to compile their physics first, on a computer that may be busy."""
+"""Devices may first have to compile their physics, possibly on a busy computer."""
 ANSWER_TIMEOUT_S = 5.0
 
 
 class VirtualSegment:
-    """A running segment. ``command`` is the control channel of `control.Control`."""
+    """A running segment. ``command`` uses the control channel of `control.Control`."""
 
     def __init__(self, process: subprocess.Popen[bytes], words: IO[bytes]) -> None:
         self._process = process
@@ -38,18 +38,18 @@ class VirtualSegment:
     def start(
         cls, interface: str, arguments: Sequence[str], namespace: Namespace | None = None
     ) -> VirtualSegment:
-        """Start it on ``interface`` and wait until it answers frames.
+        """Start the segment on ``interface`` and wait until it processes frames.
 
-        ``arguments`` are those of ``python -m drivers.virtual.wires.ethercat`` besides the
-        interface; with a ``namespace`` it runs inside.
+        ``arguments`` are those of ``python -m drivers.virtual.wires.ethercat`` without the
+        interface; with a ``namespace`` the segment runs inside it.
 
         Raises:
-            LinkLost: it did not start; the message is its own.
+            LinkLost: it did not start; the message is from the segment.
         """
         module = "drivers.virtual.wires.ethercat"
         argv = [sys.executable, "-m", module, "--iface", interface, *arguments]
-        # A file and not a pipe for what it says: a pipe that nobody reads stops it once full.
-        words = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the process
+        # Its messages go to a file: a pipe that nobody reads blocks the process once full.
+        words = tempfile.TemporaryFile()  # noqa: SIM115 - kept as long as the process
         process = subprocess.Popen(
             namespace.command(argv) if namespace else argv,
             stdin=subprocess.PIPE,
@@ -67,14 +67,14 @@ class VirtualSegment:
 
     @property
     def pid(self) -> int:
-        """Process of the segment."""
+        """Process ID of the segment."""
         return self._process.pid
 
     def command(self, do: str, **arguments: object) -> Any:
         """Send one command and return its result.
 
         Raises:
-            ValueError: the segment refuses it; the message is its own.
+            ValueError: the segment refuses it; the message is from the segment.
             LinkLost: the segment has ended.
             LinkTimeout: no answer within `ANSWER_TIMEOUT_S`.
         """
@@ -97,12 +97,12 @@ class VirtualSegment:
         return answer.get("result")
 
     def kill(self) -> None:
-        """End it at once, as a crash would."""
+        """Kill the segment, like a crash."""
         self._process.kill()
         self._process.wait()
 
     def close(self) -> None:
-        """End it in order. Calling again does nothing."""
+        """Stop the segment. Repeated calls have no effect."""
         process = self._process
         if process.stdin is not None:
             with contextlib.suppress(OSError):

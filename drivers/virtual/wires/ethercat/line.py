@@ -1,4 +1,4 @@
-"""The cable: which slaves a frame reaches, port states, link counters, power."""
+"""The cable: slaves reached by a frame, port states, link counters, power."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.slave import Slave
 
 LINK_UP_NS = 300_000_000
-"""From power-on to a working link; auto-negotiation of a 100 Mbit/s port takes about this."""
+"""From power-on to an established link; typical auto-negotiation time of a 100 Mbit/s port."""
 
 _FOREVER = 1 << 62
 _FOR_GOOD_S = 1e6
@@ -30,13 +30,13 @@ class Line:
         self._next_ns = 0
 
     def cut(self, cable: int) -> None:
-        """Pull cable ``cable``."""
+        """Disconnect cable ``cable``."""
         self._check(cable)
         self._cut.add(cable)
         self._next_ns = 0
 
     def heal(self, cable: int | None = None) -> None:
-        """Plug one cable in again, or all."""
+        """Connect one cable again, or all."""
         if cable is None:
             self._cut.clear()
         else:
@@ -45,7 +45,7 @@ class Line:
         self._next_ns = 0
 
     def is_cut(self, cable: int) -> bool:
-        """Cable is pulled."""
+        """Whether the cable is disconnected."""
         return cable in self._cut
 
     def power_off(self, position: int, now_ns: int, for_s: float | None = None) -> None:
@@ -58,16 +58,16 @@ class Line:
             self._power_changed(position, now_ns)
 
     def power_on(self, position: int) -> None:
-        """Switch it on again; its link comes up after `LINK_UP_NS`."""
+        """Switch a slave on again; its link is established after `LINK_UP_NS`."""
         self._check(position)
         device = self._slaves[position].device
         if not device.powered:
             device.power_cycle(_AT_ONCE_S)
 
     def update(self, now_ns: int) -> list[Slave]:
-        """Follow what time has brought; returns the slaves that a frame reaches now.
+        """Update links and power to the present time; return the slaves that a frame reaches.
 
-        A drive may also go off and on by itself, as after its own reset.
+        A drive may also switch off and on by itself, for example after its own reset.
         """
         for position, slave in enumerate(self._slaves):
             if position in self._off:
@@ -90,7 +90,7 @@ class Line:
         self._next_ns = 0
 
     def count_crc_error(self, position: int, port: int) -> None:
-        """A frame arrives damaged at a port: counted there, and as forwarded further on."""
+        """Count a damaged frame at a port, and as a forwarded error at the following slaves."""
         controller = self._slaves[position].controller
         controller.count(reg.RX_ERRORS + 2 * port)
         controller.count(reg.RX_ERRORS + 2 * port + 1)
@@ -131,7 +131,7 @@ class Line:
 
 
 def _show_ports(slave: Slave, up: bool, down: bool) -> None:
-    """DL status (ETG.1000.4 table 14): link bits 4 and 5, loop and communication from bit 8."""
+    """Set DL status (ETG.1000.4 table 14): link bits 4 and 5, loop and communication from bit 8."""
     status = 0x0001
     for port, linked in enumerate((up, down, False, False)):
         status |= (0x0010 << port) if linked else 0

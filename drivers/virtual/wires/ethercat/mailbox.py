@@ -1,8 +1,8 @@
 """The mailbox of one slave (ETG.1000.4 clause 7): counters, queue, repeat, errors.
 
-A request waits ``delay_ns`` before it is answered, one at a time: meanwhile the next one stays in
-sync manager 0, which is then full. A lost answer is repeated when the master toggles the repeat
-request; a request that comes twice with the same counter is accepted once.
+A request is answered after ``delay_ns``, one at a time: meanwhile the next one stays in sync
+manager 0, which is then full. A lost answer is repeated when the master toggles the repeat request;
+a request received twice with the same counter is executed once.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ _UNSUPPORTED, _INVALID_SIZE = 0x02, 0x08
 
 
 _QUEUE_LIMIT = 16
-"""Messages that wait for a free mailbox; a drive's memory for them is small, too."""
+"""Messages queued for the mailbox; the memory of a real drive is small, too."""
 
 
 class FileServer(Protocol):
-    """A file service behind the mailbox (FoE)."""
+    """A file service of the mailbox (FoE)."""
 
     def handle(self, payload: bytes) -> list[bytes]:
-        """Answers to one FoE message."""
+        """Return the answers to one FoE message."""
 
     def enter(self, capacity: int, *, boot: bool) -> None:
-        """A mailbox with ``capacity`` bytes of payload opens, in BOOT or above."""
+        """Open a mailbox with ``capacity`` bytes of payload, in BOOT or above."""
 
 
 class Mailbox:
@@ -45,13 +45,13 @@ class Mailbox:
         self._foe = foe
         self.delay_ns = 0
         self.muted = False
-        """Trouble: requests are accepted and never answered."""
+        """Injected fault: requests are accepted and never answered."""
         self.die_after_segments: int | None = None
-        """Trouble: no answer after this many segments of a segmented transfer."""
+        """Injected fault: no answer after this many segments of a segmented transfer."""
         self.open = False
         self._boot = False
         self.due_ns: int | None = None
-        """When a request under way will be answered."""
+        """Time at which the present request will be answered."""
         self._request = b""
         self._queue: deque[bytes] = deque()
         self._last_sent = b""
@@ -62,7 +62,7 @@ class Mailbox:
         self._now_ns = 0
 
     def start(self, *, boot: bool = False) -> None:
-        """Pre-Op or Boot is entered from below: fresh counters, empty boxes."""
+        """Reset counters and buffers on the transition from Init to Pre-Op or Boot."""
         self.open = True
         self._boot = boot
         if self._foe is not None:
@@ -78,7 +78,7 @@ class Mailbox:
         self._coe.reset()
 
     def stop(self) -> None:
-        """Init: nothing goes in or out."""
+        """Disable both directions in Init."""
         self.open = False
         self._inbox.locked = self._outbox.locked = True
         self._inbox.full = self._outbox.full = False
@@ -86,7 +86,7 @@ class Mailbox:
         self._queue.clear()
 
     def at(self, now_ns: int) -> None:
-        """Time of the access that comes next; sync managers have no time."""
+        """Set the time of the next access; sync managers have no clock."""
         self._now_ns = now_ns
 
     def run(self, now_ns: int) -> None:
@@ -106,7 +106,7 @@ class Mailbox:
         self._outbox.repeat_ack = self._outbox.repeat_request
 
     def emergency(self, code: int, register: int, data: bytes) -> None:
-        """Queue an emergency; without an open mailbox or with a full queue it is lost."""
+        """Queue an emergency; it is lost if the mailbox is not open or the queue is full."""
         if self.open and not self.muted and len(self._queue) < _QUEUE_LIMIT:
             self._post(_COE, CoeServer.emergency(code, register, data))
 

@@ -1,9 +1,9 @@
-"""Process data of one slave: exchanged at a SYNC pulse, or at the event of the frame.
+"""Process data of one slave: exchanged at a SYNC pulse, or at the sync manager event of the frame.
 
-With a SYNC pulse the physics run on the slave's own grid and are computed lazily, when a frame
-comes; a frame that comes too late leaves the outputs of the cycle before in force, as in a drive.
-With SYNC1 next to a faster SYNC0, outputs and inputs are exchanged at SYNC1, and SYNC0 is the
-drive's own cycle (ETG.1020 clause 22, sync type 3).
+With a SYNC pulse the physics run on the slave's own time grid and are computed lazily when a frame
+arrives; if a frame is late, the outputs of the previous cycle stay in effect, as in a drive. With
+SYNC1 and a faster SYNC0, outputs and inputs are exchanged at SYNC1, and SYNC0 is the drive's own
+cycle (ETG.1020 clause 22, sync type 3).
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from drivers.virtual.wires.ethercat.registers import AlCode
 from drivers.virtual.wires.ethercat.syncmanager import SyncManager
 
 _SHORTEST_CYCLE_NS = 31_250
-"""No drive of ours goes below; where the manual prints a limit, that one counts as well."""
+"""Shortest cycle of our drives; a limit in the manual applies as well."""
 
 _FREE_RUN, _SYNC_MANAGER, _SYNC0, _SYNC1 = 0, 1, 2, 3
 
 
 class ProcessData:
-    """Binds the mapping to the sync managers 2 and 3 and to the time grid."""
+    """Connects the mapping with sync managers 2 and 3 and with the time grid."""
 
     def __init__(
         self,
@@ -50,17 +50,17 @@ class ProcessData:
         outputs.on_written = self._written
         self._now_ns = 0
         self.received = False
-        """Outputs have come since Safe-Op was entered."""
+        """Outputs were received since Safe-Op was entered."""
         self.written_ns: int | None = None
-        """When outputs came last; starts the watchdog."""
+        """Time of the last outputs; starts the watchdog."""
 
     @property
     def has_outputs(self) -> bool:
-        """Something is mapped from master to drive."""
+        """Whether any output is mapped."""
         return self._rx is not None and self._rx.size > 0
 
     def check(self) -> int:
-        """Compare mapping, sync managers and clock before Safe-Op: an AL status code or 0."""
+        """Check mapping, sync managers and clock before Safe-Op; return an AL status code or 0."""
         for direction, manager, mapping_code, config_code in (
             ("rx", self._outputs, AlCode.INVALID_OUTPUT_MAPPING, AlCode.INVALID_OUTPUT_CONFIG),
             ("tx", self._inputs, AlCode.INVALID_INPUT_MAPPING, AlCode.INVALID_INPUT_CONFIG),
@@ -96,7 +96,7 @@ class ProcessData:
         return self._device.map_process_data(list(entries), direction) if entries else None
 
     def start(self, now_ns: int) -> None:
-        """Safe-Op: bind the mapping, unlock the sync managers, give the first inputs."""
+        """Safe-Op: bind the mapping, unlock the sync managers, provide the first inputs."""
         self._rx, self._tx = self._bind("rx"), self._bind("tx")
         self._outputs.locked = self._inputs.locked = False
         self._latest, self._fresh, self.received = b"", False, False
@@ -115,16 +115,16 @@ class ProcessData:
         return _SYNC0 if self._clock.sync1_delay_ns is None else _SYNC1
 
     def stop(self) -> None:
-        """Below Safe-Op nothing is exchanged."""
+        """Stop all exchange below Safe-Op."""
         self._running = self._operational = False
         self._outputs.locked = self._inputs.locked = True
         self._rx = self._tx = None
         self._report.mode = _FREE_RUN
 
     def operate(self, on: bool) -> None:
-        """In Op the outputs act; in Safe-Op they are received and ignored.
+        """Apply outputs in Op; in Safe-Op they are received and ignored.
 
-        Outputs from before a fall never act again: Op must be entered with new ones.
+        Outputs from before a fall are never applied again: Op must be entered with new ones.
         """
         if self._operational and not on:
             self._latest, self._fresh, self.received = b"", False, False
@@ -134,21 +134,21 @@ class ProcessData:
 
     @property
     def synchronised(self) -> bool:
-        """SYNC0 has come since Safe-Op, or is not asked for."""
+        """Whether SYNC0 has occurred since Safe-Op, or is not required."""
         return self._seen_sync0 or not self._clock.sync0_requested
 
     @property
     def operational(self) -> bool:
-        """It takes outputs and latches inputs at every SYNC0."""
+        """Whether outputs are applied and inputs latched at every SYNC0."""
         return self._operational
 
     @property
     def next_tick_ns(self) -> int | None:
-        """Next SYNC0 or SYNC1 that has work to do."""
+        """Next SYNC0 or SYNC1 with work to do."""
         return self._clock.next_pulse(self._ticked_ns) if self._running else None
 
     def tick(self, now_ns: int) -> None:
-        """A pulse at ``now_ns``: the drive works; with that of the process data, exchange them."""
+        """Process a pulse at ``now_ns``: run the drive, exchange process data if due."""
         self._ticked_ns = now_ns
         self._seen_sync0 = True
         self._device.advance(now_ns)
@@ -163,7 +163,7 @@ class ProcessData:
         self._latch()
 
     def skip_to(self, now_ns: int) -> None:
-        """Outside Op nothing happens at a SYNC0 but the latching of inputs: do only the last."""
+        """Skip to the last SYNC0: outside Op a SYNC0 only latches inputs."""
         if self._operational:
             return
         last = self._clock.last_sync0(now_ns)
@@ -171,7 +171,7 @@ class ProcessData:
             self.tick(last)
 
     def at(self, now_ns: int) -> None:
-        """Time of the access that comes next."""
+        """Set the time of the next access."""
         self._now_ns = now_ns
 
     def _written(self) -> None:
@@ -180,7 +180,7 @@ class ProcessData:
         self.written_ns = self._now_ns
 
     def after_frame(self, now_ns: int) -> None:
-        """Without SYNC0 the event of the sync manager takes outputs and latches inputs."""
+        """Without SYNC0, apply outputs and latch inputs at the sync manager event."""
         if not self._running or self._clock.sync0_requested:
             return
         if self._fresh or not self.has_outputs:

@@ -53,7 +53,7 @@ DC_SYNC0_CYCLE = 0x09A0
 DC_SYNC1_CYCLE = 0x09A4
 RAM = 0x1000
 
-#: Registers that a master may write; everything else below 1000h ignores it.
+#: Registers that a master may write; writes to others below 1000h are ignored.
 WRITABLE: tuple[tuple[int, int], ...] = (
     (STATION_ADDRESS, 2),
     (0x0020, 2),
@@ -107,7 +107,7 @@ class AlState(IntEnum):
 
 
 class AlCode(IntEnum):
-    """AL status codes (ETG.1000.6 table 11) that this slave gives."""
+    """AL status codes (ETG.1000.6 table 11) used by this slave."""
 
     NONE = 0x0000
     INVALID_TRANSITION = 0x0011

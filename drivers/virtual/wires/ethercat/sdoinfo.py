@@ -1,4 +1,4 @@
-"""SDO information service: which objects there are and what they are (ETG.1000.6 clause 5.6.3)."""
+"""SDO information service: list and description of objects (ETG.1000.6 clause 5.6.3)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _WITH_DEFAULT, _WITH_MINIMUM, _WITH_MAXIMUM = 0x10, 0x20, 0x40
 
 
 def answer(dictionary: CoeDictionary, body: bytes, capacity: int) -> list[bytes]:
-    """Fragments that answer one request; ``capacity`` is bytes of one fragment with its header."""
+    """Return the fragments of one answer; ``capacity`` is bytes per fragment with header."""
     if len(body) < _HEADER:
         return [_error(ABORT_UNSUPPORTED)]
     try:
@@ -68,7 +68,7 @@ def _fragments(opcode: int, data: bytes, capacity: int) -> list[bytes]:
 
 
 def _object_list(dictionary: CoeDictionary, kind: int) -> bytes:
-    """List types 1 (all), 2 (RxPDO-mappable) and 3 (TxPDO-mappable); 0 gives the five lengths."""
+    """Return list type 1 (all), 2 (RxPDO-mappable) or 3 (TxPDO-mappable); 0: five lengths."""
     lists = {1: dictionary.indices()}
     if kind in (0, 2, 3):
         lists[2] = [i for i in lists[1] if _mappable(dictionary, i, receive=True)]
@@ -123,7 +123,7 @@ def _describe_entry(dictionary: CoeDictionary, index: int, subindex: int, wanted
 
 
 def _printed(parameter: Parameter | None) -> list[tuple[int, int | float | str]]:
-    """What the manual prints of default, minimum and maximum, in the order of the service."""
+    """Return the manual's default, minimum and maximum, in the order of the service."""
     if parameter is None:
         return []
     found = (
@@ -140,4 +140,4 @@ def _encoded(info: EntryInfo, raw: int | float | str) -> bytes | None:
     try:
         return encode(info.type, raw)
     except OutOfRange:
-        return None  # a printed value that does not fit its type is not repeated as a fact
+        return None  # a listed value that does not fit its type is omitted

@@ -1,7 +1,7 @@
-"""A line of slaves: one frame in, the same frame back with everybody's data and counters.
+"""A line of slaves: takes one frame and returns it with all slaves' data and working counters.
 
-Addressing and working counters follow ETG.1000.4 clause 5.4: position and broadcast addresses
-are incremented by every slave, a read counts 1, a write 1, in read-write commands a write 2.
+Addressing and working counters follow ETG.1000.4 clause 5.4: position and broadcast addresses are
+incremented by every slave, a read counts 1, a write 1, in read-write commands a write 2.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from drivers.virtual.wires.ethercat.trouble import NO_TROUBLE, Trouble
 ETHERTYPE = b"\x88\xa4"
 _ETHERNET, _HEADER, _DATAGRAM = 14, 2, 10
 _LENGTH_MASK = 0x07FF
-# Plain numbers: looking a member up in its enumeration costs a cycle more than using it.
+# Plain integers: an enumeration look-up costs more time than the use of the value.
 _APRD, _APRW, _FPRD, _FPWR = map(int, (Command.APRD, Command.APRW, Command.FPRD, Command.FPWR))
 _BRD, _BRW, _ARMW, _FRMW = map(int, (Command.BRD, Command.BRW, Command.ARMW, Command.FRMW))
 _LWR, _LRD = int(Command.LWR), int(Command.LRD)
@@ -28,7 +28,7 @@ _LOGICAL = frozenset({_LRD, _LWR, int(Command.LRW)})
 
 
 class _Datagram(NamedTuple):
-    """Where one datagram and its data lie in the frame."""
+    """Position of one datagram and its data in the frame."""
 
     command: int
     at: int
@@ -36,7 +36,7 @@ class _Datagram(NamedTuple):
 
 
 def datagrams(frame: bytes | bytearray) -> list[_Datagram]:
-    """Split a frame; a malformed rest is left out, as a controller leaves it alone."""
+    """Split a frame; a malformed rest is omitted, as a controller ignores it."""
     found: list[_Datagram] = []
     at = _ETHERNET + _HEADER
     while at + _DATAGRAM + 2 <= len(frame):
@@ -58,19 +58,19 @@ class Segment:
         self.slaves = list(slaves)
         self.clock = clock
         self.line = Line(self.slaves)
-        # Reproducible trouble, not a secret.
+        # Reproducible faults, not a secret.
         self.trouble = Trouble(random.Random(seed))  # noqa: S311
         self.frames = 0
         self.reply_delay_ns = 0
-        """How long the reply of the last frame is to be held back."""
+        """Time by which the reply of the last frame must be delayed."""
         self.hold_ns = 0
-        """When above 0, the last frame has not been processed: it is to come again, as held."""
+        """If above 0, the last frame is not processed yet: pass it again as ``held``."""
 
     def process_frame(self, frame: bytes, age_ns: int = 0, held: bool = False) -> bytes | None:
-        """One frame from the master; None when nothing comes back.
+        """Process one frame from the master; return None if there is no reply.
 
-        ``age_ns`` is how long ago it arrived, where the network stack reports. A frame that the
-        caller has held back for `hold_ns` comes again as ``held``.
+        ``age_ns`` is the time since it arrived, if the network stack reports it. A frame that the
+        caller has delayed by `hold_ns` is passed again as ``held``.
         """
         self.reply_delay_ns = self.hold_ns = 0
         if len(frame) < _ETHERNET + _HEADER or frame[12:14] != ETHERTYPE:
@@ -105,14 +105,14 @@ class Segment:
         return bytes(buffer)
 
     def next_tick_ns(self) -> int | None:
-        """Next SYNC0 of the last slave in Op, as they share their grid; None without one."""
+        """Return the next pulse of the last slave in Op (one common grid); None without one."""
         for slave in reversed(self.slaves):
             if slave.process.operational:
                 return slave.process.next_tick_ns
         return None
 
     def settle(self, until_ns: int | None = None) -> int:
-        """Let time pass for every slave without a frame, at most to ``until_ns``; returns it."""
+        """Advance all slaves without a frame, at most to ``until_ns``; return the time reached."""
         now = self.clock.now(until_ns)
         self.line.update(now)
         for slave in self.slaves:
@@ -120,7 +120,7 @@ class Segment:
         return now
 
     def _cycle_ns(self) -> int:
-        """Cycle of the process data; SYNC0 alone may be faster."""
+        """Return the cycle of the process data; SYNC0 itself may be faster."""
         for slave in self.slaves:
             if slave.dc.sync0_first_ns is not None:
                 return slave.dc.exchange_cycle_ns
@@ -158,7 +158,7 @@ class Segment:
 
     @staticmethod
     def _physical(slave: Slave, part: _Datagram, buffer: bytearray, command: int, now: int) -> None:
-        """One slave, one datagram: kinds repeat every three commands (read, write, both)."""
+        """Process one datagram in one slave: command kinds are read, write, read-write in turn."""
         offset = buffer[part.at + 4] | buffer[part.at + 5] << 8
         kind = (command - 1) % 3
         incoming = bytes(buffer[part.data])
@@ -198,7 +198,7 @@ def _count(buffer: bytearray, part: _Datagram, by: int) -> None:
 
 
 def register(slave: Slave, address: int, length: int) -> int:
-    """A register's present value, for tests and the control channel."""
+    """Return the present value of a register, for tests and the control channel."""
     return int.from_bytes(slave.controller.memory[address : address + length], "little")
 
 

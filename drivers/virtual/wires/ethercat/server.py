@@ -1,4 +1,4 @@
-"""The segment on a network interface: a raw socket, the clock, and late replies."""
+"""The segment on a network interface: a raw socket, the clock, and delayed replies."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _SOL_PACKET = 263
 _LONGEST = 1600
 _STALE_NS = 1_000_000_000
 _IDLE_S = 0.05
-"""Without frames, time is made up for this often, so that no backlog of physics builds up."""
+"""Interval of time updates without frames, so that the physics do not fall behind."""
 
 
 class InterfaceLock:
     """One slave segment per interface: an abstract socket name, which belongs to the network
-    namespace as the interface does and goes with its process.
+    namespace like the interface and is released with its process.
     """
 
     def __init__(self, interface: str) -> None:
@@ -41,15 +41,15 @@ class InterfaceLock:
             ) from error
 
     def release(self) -> None:
-        """Let go."""
+        """Release the lock."""
         self._socket.close()
 
 
 def open_socket(interface: str) -> socket.socket:
-    """A raw socket for EtherCAT frames that come in on ``interface``.
+    """Open a raw socket for EtherCAT frames received on ``interface``.
 
     Raises:
-        LinkLost: no such interface or no permission; the message says which.
+        LinkLost: no such interface or no permission; the message states which.
     """
     if len(interface.encode()) > 15:
         raise LinkLost("virtual.interface-name-longer-15", interface=interface)
@@ -60,7 +60,7 @@ def open_socket(interface: str) -> socket.socket:
     try:
         raw.setsockopt(_SOL_PACKET, _PACKET_IGNORE_OUTGOING, 1)
         raw.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
-        # "Ready" is only true after bind: earlier frames would be lost.
+        # Report "ready" only after bind: earlier frames would be lost.
         raw.bind((interface, _ETH_P_ECAT))
     except OSError as error:
         raw.close()
@@ -72,7 +72,7 @@ def open_socket(interface: str) -> socket.socket:
 
 
 class SegmentServer:
-    """Answers frames and control commands until its control channel closes or says stop."""
+    """Processes frames and control commands until the control channel closes or commands a stop."""
 
     def __init__(
         self, interface: str, segment: Segment, commands: IO[bytes], answers: IO[bytes]
@@ -91,26 +91,26 @@ class SegmentServer:
         self._sequence = 0
 
     def run(self) -> None:
-        """Serve. Returns when commanded to stop."""
+        """Run until commanded to stop."""
         wire, descriptors = self._socket.fileno(), (self._socket.fileno(), self._commands)
         self._control.ready()
         while not self._control.stopped:
-            # Drives work at their SYNC0, and not when the next frame waits for its answer.
+            # Drives run at their SYNC0, not when the next frame must be answered.
             tick = self._segment.next_tick_ns()
             ready, _, _ = select.select(descriptors, (), (), self._wait_s(tick))
             if wire in ready:
-                # One at a time: where one follows the other's answer none waits behind.
+                # One at a time: if each frame follows the previous answer, none has to wait.
                 self._answer()
             if self._commands in ready and not self._command():
                 return
             if self._late:
                 self._finish_late()
             if not ready:
-                # What the socket holds by now came after this SYNC0, and is to find it so.
+                # Frames in the socket now came after this SYNC0 and must see its effect.
                 self._segment.settle(tick)
 
     def close(self) -> None:
-        """Free socket and interface."""
+        """Close the socket and release the interface."""
         self._socket.close()
         self._lock.release()
 
@@ -126,31 +126,31 @@ class SegmentServer:
     def _command(self) -> bool:
         data = os.read(self._commands, 65536)
         if data:
-            # A command looks at the present: frames that came before it belong to the past.
+            # A command uses the present state: process earlier frames first.
             self._drain()
             self._control.feed(data)
         return bool(data)
 
     def _carrier(self, on: bool) -> None:
-        """Pulling the master's cable takes its carrier away, where we may switch interfaces.
+        """Set the interface's carrier as the master's cable is connected or not, if permitted.
 
-        Where we may not, no frame comes back all the same.
+        Without the permission, frames are still not answered.
         """
         with contextlib.suppress(OSError):
             netns.set_up(self._interface, on)
 
     def _drain(self) -> None:
-        """All frames that wait, at most a batch, so that commands are heard too."""
+        """Process all waiting frames, up to a limit, so that commands are processed too."""
         for _ in range(64):
             if not self._answer():
                 return
 
     def _answer(self) -> bool:
-        """The next frame that waits; False if there is none."""
+        """Process the next waiting frame; return False if there is none."""
         try:
             frame, ancillary, _, _ = receive_with_notes(self._socket, _LONGEST, 64)
         except OSError:
-            return False  # none, or the interface was switched off; it may come back
+            return False  # no frame, or the interface was switched off; it may be switched on again
         reply = self._segment.process_frame(frame, _age_ns(ancillary))
         if self._segment.hold_ns:
             self._postpone(self._segment.hold_ns, frame, is_reply=False)
@@ -166,7 +166,7 @@ class SegmentServer:
         heapq.heappush(self._late, (due_ns, self._sequence, is_reply, frame))
 
     def _finish_late(self) -> None:
-        """Send late replies and process late frames that are due."""
+        """Send delayed replies and process delayed frames that are due."""
         while self._late and self._late[0][0] <= time.monotonic_ns():
             _, _, is_reply, frame = heapq.heappop(self._late)
             reply = frame if is_reply else self._segment.process_frame(frame, held=True)
@@ -174,13 +174,13 @@ class SegmentServer:
                 self._send(reply)
 
     def _send(self, frame: bytes) -> None:
-        # A full queue or a dead interface loses the frame, as a cable would.
+        # If the queue is full or the interface is down, the frame is lost, as on a cable.
         with contextlib.suppress(OSError):
             self._socket.send(frame)
 
 
 def _age_ns(ancillary: list[tuple[int, int, bytes]]) -> int:
-    """How long ago the kernel saw the frame; 0 if it does not report or its clock was set."""
+    """Return the time since the kernel received the frame; 0 if unknown or its clock was set."""
     for level, kind, data in ancillary:
         if level == socket.SOL_SOCKET and kind == _SO_TIMESTAMPNS and len(data) >= 16:
             seconds, nanoseconds = struct.unpack_from("qq", data)

@@ -1,7 +1,7 @@
 """Slave information interface: the EEPROM image (ETG.2010) and its register interface.
 
-The image is built from the profile; the register interface is ETG.1000.4 clause 6.4: a command
-keeps the busy bit up for a while, and writing needs the write-enable bit in the same frame.
+The image is built from the profile; the register interface is ETG.1000.4 clause 6.4: a command sets
+the busy bit for a time, and writing requires the write-enable bit in the same frame.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PROTOCOL_FOE = 0x08
 
 @dataclass(frozen=True, slots=True)
 class SmLayout:
-    """Start address, length and control byte of one sync manager, as the EEPROM gives them."""
+    """Start address, length and control byte of one sync manager, as in the EEPROM."""
 
     start: int
     length: int
@@ -49,7 +49,7 @@ class SiiPdo:
 
 @dataclass(frozen=True, slots=True)
 class SiiContent:
-    """Everything that goes into the image."""
+    """Contents of the image."""
 
     vendor_id: int
     product_code: int
@@ -62,14 +62,14 @@ class SiiContent:
     foe: bool
     sync_managers: tuple[SmLayout, ...]
     boot: tuple[SmLayout, SmLayout] | None = None
-    """Mailboxes in BOOT, of a slave that has this state."""
+    """Mailboxes in BOOT, for a slave with this state."""
     rx_pdos: tuple[SiiPdo, ...] = ()
     tx_pdos: tuple[SiiPdo, ...] = ()
     clocks: bool = True
 
 
 def checksum(first_14_bytes: bytes) -> int:
-    """CRC-8 of words 0 to 6: polynomial x^8+x^2+x+1, start value FFh (ETG.2010 table 2)."""
+    """Return the CRC-8 of words 0 to 6: polynomial x^8+x^2+x+1, start FFh (ETG.2010 table 2)."""
     crc = 0xFF
     for byte in first_14_bytes:
         crc ^= byte
@@ -79,7 +79,7 @@ def checksum(first_14_bytes: bytes) -> int:
 
 
 def build(content: SiiContent) -> bytes:
-    """The whole image, padded with FFh to `SIZE_BYTES`."""
+    """Return the complete image, padded with FFh to `SIZE_BYTES`."""
     mailbox_out, mailbox_in = content.sync_managers[0], content.sync_managers[1]
     image = bytearray(0x80)
     struct.pack_into("<HHHHH", image, 0, 0x0C08, 0xEE88, 0x000A, 0, content.alias)
@@ -124,7 +124,7 @@ def build(content: SiiContent) -> bytes:
 
 
 class _Strings:
-    """The string category; others refer to its entries by number, counting from 1."""
+    """The string category; others refer to its entries by number, counted from 1."""
 
     def __init__(self) -> None:
         self._texts: list[bytes] = []
@@ -146,7 +146,7 @@ def _category(kind: int, data: bytes) -> bytes:
 
 
 def _general(content: SiiContent, names: _Strings) -> bytes:
-    # SOEM takes string 1 for the name, whatever this category says: so the name comes first.
+    # SOEM always takes string 1 as the name, so the name is first.
     name = names.number(content.name)
     group = names.number(content.group)
     data = bytearray(32)
@@ -177,7 +177,7 @@ def _pdos(pdos: Sequence[SiiPdo]) -> bytes:
 
 
 def _clocks(names: _Strings) -> bytes:
-    """Two modes: SYNC0 (assign-activate 300h) and free of DC (0), as ESI files give them."""
+    """Return two modes as in ESI files: SYNC0 (assign-activate 300h) and without DC (0)."""
     modes = ((0x0300, names.number("DC")), (0x0000, names.number("SM")))
     return b"".join(
         struct.pack("<IIIhHhBBI", 0, 0, 0, 0, activate, 1 if activate else 0, name, 0, 0)
@@ -197,10 +197,10 @@ _FOREVER_NS = 1 << 62
 
 
 class Eeprom:
-    """The EEPROM behind registers 500h to 50Fh. The content survives power cycles.
+    """The EEPROM at registers 500h to 50Fh. The content is kept over power cycles.
 
-    A word is sent to the chip while the interface is busy (``write_ns``); then the chip stores it
-    for ``store_ns``, in which it does not acknowledge another command (bit 13).
+    A word is transferred to the chip while the interface is busy (``write_ns``); the chip then
+    stores it for ``store_ns`` and does not acknowledge other commands meanwhile (bit 13).
     """
 
     def __init__(self, image: bytes) -> None:
@@ -210,18 +210,18 @@ class Eeprom:
         self.store_ns = 0
         self.busy_until_ns = 0
         self.cut_after: int | None = None
-        """So many words are still written; then the supply of the chip fails inside a word."""
+        """Number of words still written before the supply of the chip fails within a word."""
         self.words_written = 0
         self._storing_until_ns = 0
         self._power_on()
 
     @property
     def loaded(self) -> bool:
-        """Whether the controller took the configuration at power-on: the checksum was right."""
+        """Whether the checksum was correct when the controller loaded the configuration."""
         return not self._load_status
 
     def power_on(self) -> None:
-        """The controller loads the configuration; a chip without supply is there again."""
+        """Load the configuration as at power-on; a failed chip supply is restored."""
         self.busy_until_ns = self._storing_until_ns = 0
         self.cut_after = None
         self._power_on()
@@ -240,11 +240,11 @@ class Eeprom:
         return int(struct.unpack_from("<H", self.image, ALIAS_WORD * 2)[0])
 
     def status(self, now_ns: int) -> int:
-        """Value of register 502h."""
+        """Return the value of register 502h."""
         return self._status | (_BUSY if now_ns < self.busy_until_ns else 0)
 
     def command(self, control: int, address: int, data: bytes, now_ns: int) -> bytes | None:
-        """Execute what was written to 502h; returns the new content of 508h after a read."""
+        """Execute a command written to 502h; return the new value of 508h after a read."""
         if now_ns < self.busy_until_ns:
             return None  # the controller ignores commands while it is busy
         code = control & _COMMAND_MASK
@@ -273,7 +273,7 @@ class Eeprom:
 
     def _store(self, at: int, word: bytes, now_ns: int) -> None:
         if self.cut_after == 0:
-            # Half of the word is stored, and the interface waits for a chip that is dead.
+            # Half of the word is stored; the interface stays busy without an answer of the chip.
             self.image[at : at + 1] = word[:1]
             self.busy_until_ns = _FOREVER_NS
             return

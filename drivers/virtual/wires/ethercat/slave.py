@@ -1,7 +1,7 @@
-"""One slave: a controller with the drive behind it.
+"""One slave: a controller with its drive.
 
-Order of events is by the wire's time: everything that was due before a frame arrived (answers,
-state changes, SYNC0, watchdog) happens before the frame is processed.
+Events occur in the order of segment time: all events due before a frame arrives (answers, state
+changes, SYNC0, watchdog) are processed before the frame.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _HOUSEKEEPING_NS = 1_000_000
 _NEVER = 1 << 62
 
 MAILBOXES = (256, 256)
-"""Bytes of the mailboxes to and from the drive; no more than that has room."""
+"""Size in bytes of the mailboxes to and from the drive; the address range has no more room."""
 
 
 def _layout(mailboxes: tuple[int, int]) -> tuple[sii.SmLayout, ...]:
@@ -43,19 +43,19 @@ BOOT_LAYOUT = (
     sii.SmLayout(0x1000, 512, 0x26, 1, 1),
     sii.SmLayout(0x1200, 512, 0x22, 1, 2),
 )
-"""In BOOT there are no process data, so the mailboxes may take their room."""
+"""In BOOT there are no process data, so the mailboxes may use their memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class SlaveIdentity:
-    """What distinguishes two drives of one family."""
+    """Distinguishes two drives of one family."""
 
     serial: int = 0
     alias: int = 0
 
 
 class Slave:
-    """See the module docstring. Not thread-safe: the segment's thread calls it."""
+    """See the module docstring. Not thread-safe: called by the segment's thread."""
 
     dictionary_type: type[CoeDictionary] = CoeDictionary
 
@@ -94,20 +94,20 @@ class Slave:
         self.power_on(0)
 
     def sii_layout(self, mailboxes: tuple[int, int]) -> tuple[sii.SmLayout, ...]:
-        """Its sync managers, as the EEPROM gives them."""
+        """Return the sync managers as in the EEPROM."""
         return _layout(mailboxes)
 
     # -- power ----------------------------------------------------------------------------------
 
     def power_on(self, now_ns: int) -> None:
-        """Registers as after power-on; the EEPROM keeps its content, the drive its NVM."""
+        """Set registers to power-on values; EEPROM and the drive's NVM keep their content."""
         self.controller.power_on(self._has_dc)
         self.restart(now_ns)
         self.dictionary.reset()
         self.dc.power_on(now_ns)
 
     def restart(self, now_ns: int) -> None:
-        """The drive's processor starts again while the controller keeps its registers."""
+        """Restart the drive's processor; the controller keeps its registers."""
         self.al.power_on()
         self.mailbox.stop()
         self.process.stop()
@@ -117,7 +117,7 @@ class Slave:
     # -- time -----------------------------------------------------------------------------------
 
     def run(self, now_ns: int) -> None:
-        """Let everything happen that is due up to ``now_ns``, in the order of time."""
+        """Process all events due up to ``now_ns``, in order of time."""
         self.process.skip_to(now_ns)
         while True:
             event = tick = self.process.next_tick_ns or _NEVER
@@ -152,14 +152,14 @@ class Slave:
         self.process.at(now_ns)
 
     def after_frame(self, now_ns: int) -> None:
-        """Called once a frame has left."""
+        """Process the end of a frame."""
         self.process.after_frame(now_ns)
         if self.al.due_ns is not None:
             self.al.retry(now_ns)
             self._show()
 
     def _housekeeping(self, now_ns: int) -> None:
-        """Keep the drive alive where no SYNC0 does, once a millisecond at most."""
+        """Run the drive without SYNC0, at most once per millisecond."""
         self._housekeeping_ns = now_ns + _HOUSEKEEPING_NS
         if self.process.next_tick_ns is None:
             self.device.advance(now_ns)
@@ -188,7 +188,7 @@ class Slave:
     def _show(self) -> None:
         self.controller.show_state(self.al.status, self.al.code)
 
-    # -- what the controller reports --------------------------------------------------------------
+    # -- events of the controller ---------------------------------------------------------------
 
     def state_requested(self, control: int, now_ns: int) -> None:
         """The master has written AL control."""
@@ -197,11 +197,11 @@ class Slave:
         self._show()
 
     def mailbox_repeat_requested(self) -> None:
-        """The master may have missed the last answer."""
+        """The master may have lost the last answer."""
         self.mailbox.repeat_toggled()
 
     def configuration_changed(self) -> None:
-        """A master that switches off what the present state needs forces an error state."""
+        """Cause an error state if the master disables what the present state needs."""
         heading = min(self.al.state, self.al.target)
         if heading == AlState.BOOT and not self._mailbox_set(BOOT_LAYOUT):
             self.al.fall(AlState.INIT, AlCode.INVALID_MAILBOX_BOOT)
@@ -211,10 +211,10 @@ class Slave:
             self.al.fall(AlState.PREOP, code)
         self._show()
 
-    # -- what the state machine asks ------------------------------------------------------------
+    # -- calls of the state machine --------------------------------------------------------------
 
     def check(self, target: AlState) -> int:
-        """Forbid states for which the master's configuration is wrong."""
+        """Forbid states for which the master's configuration is invalid."""
         if not self.controller.eeprom.loaded and target != AlState.INIT:
             return AlCode.EEPROM_ERROR
         if target == AlState.BOOT:
@@ -232,7 +232,7 @@ class Slave:
         return 0
 
     def _mailbox_set(self, wanted: Sequence[sii.SmLayout] | None = None) -> bool:
-        """Sync managers 0 and 1 are as the EEPROM describes them."""
+        """Whether sync managers 0 and 1 are set as the EEPROM describes them."""
         layout = self._layout if wanted is None else wanted
         return all(
             sm.enabled
@@ -243,7 +243,7 @@ class Slave:
         )
 
     def waits_for(self, target: AlState) -> int:
-        """Op begins with the first outputs (004:990-992) and, with DC, the first SYNC0."""
+        """Op requires the first outputs (004:990-992) and, with DC, the first SYNC0."""
         if target != AlState.OP:
             return 0
         if not self.process.synchronised:
@@ -253,7 +253,7 @@ class Slave:
         return 0
 
     def entered(self, old: AlState, new: AlState, code: int) -> None:
-        """Start and stop mailbox, process data and the drive's reaction."""
+        """Start and stop the mailbox, process data and the drive's reaction."""
         if new == AlState.INIT:
             self.mailbox.stop()
         elif old == AlState.INIT:
@@ -274,7 +274,7 @@ class Slave:
 
 
 def _supports_dc(device: Device) -> bool:
-    """The profile names its synchronisation modes, and one of them is with distributed clocks."""
+    """Whether the profile lists a synchronisation mode with distributed clocks."""
     pdo = device.profile.pdo
     return bool(pdo and any("DC" in mode.upper() for mode in pdo.sync_modes))
 
@@ -292,7 +292,7 @@ def _sii_content(
     layout: tuple[sii.SmLayout, ...],
     has_dc: bool,
 ) -> sii.SiiContent:
-    """The EEPROM's content, from the profile and the drive's own 1018h."""
+    """Return the EEPROM content, from the profile and the drive's own 1018h."""
     profile = device.profile
     link = profile.link("ethercat")
     vendor, product, revision, serial = (_identity_word(device, n) for n in (1, 2, 3, 4))
@@ -320,7 +320,7 @@ def _sii_content(
 
 
 def _identity_word(device: Device, subindex: int) -> int:
-    """From the drive's 1018h, so that EEPROM and dictionary agree; else from the profile."""
+    """Return a word of the drive's 1018h, as in its dictionary; otherwise of the profile."""
     try:
         return int.from_bytes(device.read(0x1018, subindex)[:4], "little")
     except SdoAbort:

@@ -1,7 +1,7 @@
-"""Sync managers and FMMUs: who may touch which byte of process memory, and when.
+"""Sync managers and FMMUs: access rules of the process memory.
 
-ETG.1000.4 clauses 6.6 and 6.7. In mailbox mode a buffer is written once and read once, its state
-changing on the last byte; in buffered mode the newest complete data win.
+ETG.1000.4 clauses 6.6 and 6.7. In mailbox mode a buffer is written once and read once, and its
+state changes on the last byte; in buffered mode the newest complete data are valid.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def _ignore() -> None:
 
 @dataclass(slots=True)
 class SyncManager:
-    """One channel. ``locked`` is the slave application's side of the switch (PDI control bit 0)."""
+    """One channel. ``locked`` is set by the slave application (PDI control bit 0)."""
 
     number: int
     start: int = 0
@@ -39,11 +39,11 @@ class SyncManager:
     on_written: Callable[[], None] = _ignore
     on_read: Callable[[], None] = _ignore
     end: int = field(default=0, init=False)
-    """First address behind the buffer."""
+    """First address after the buffer."""
     enabled: bool = field(default=False, init=False)
-    """Switched on by the master."""
+    """Enabled by the master."""
     mailbox: bool = field(default=False, init=False)
-    """Mailbox mode rather than three buffers."""
+    """Mailbox mode instead of buffered mode."""
     writable: bool = field(default=False, init=False)
     """The master writes, the slave reads."""
     watches: bool = field(default=False, init=False)
@@ -56,7 +56,7 @@ class SyncManager:
         return bool(self.activate & _REPEAT)
 
     def configure(self, raw: bytes) -> None:
-        """Take over 8 register bytes; status (+5) and PDI control (+7) are not the master's."""
+        """Apply 8 register bytes, except status (+5) and PDI control (+7), which are read-only."""
         before = (self.start, self.length, self.control, self.activate & _ENABLE)
         self.start, self.length, self.control = struct.unpack_from("<HHB", raw)
         self.activate = raw[6]
@@ -69,13 +69,13 @@ class SyncManager:
             self.reset()
 
     def reset(self) -> None:
-        """Empty buffer, as after power-on or reconfiguration."""
+        """Clear the buffer, as after power-on or reconfiguration."""
         self.data = bytearray(self.length)
         self.full = False
         self._opened = False
 
     def registers(self) -> bytes:
-        """The 8 register bytes as the master reads them."""
+        """Return the 8 register bytes as the master reads them."""
         status = MAILBOX_FULL if self.full and self.mailbox else 0
         pdi = (_ENABLE if self.locked else 0) | (_REPEAT if self.repeat_ack else 0)
         return struct.pack(
@@ -83,7 +83,7 @@ class SyncManager:
         )
 
     def read(self, address: int, length: int) -> bytes | None:
-        """The master reads; None where the channel does not allow it (working counter stays)."""
+        """Read by the master; None if the channel does not allow it (no working counter)."""
         if self.locked or self.writable:
             return None
         offset = address - self.start
@@ -102,7 +102,7 @@ class SyncManager:
         return taken
 
     def write(self, address: int, data: bytes) -> bool:
-        """The master writes; False where the channel does not allow it."""
+        """Write by the master; False if the channel does not allow it."""
         if self.locked or not self.writable:
             return False
         offset = address - self.start
@@ -119,13 +119,13 @@ class SyncManager:
         return True
 
     def put(self, message: bytes) -> None:
-        """The slave fills a mailbox that the master will read."""
+        """Write a message to the mailbox that the master reads."""
         self.data = bytearray(message.ljust(self.length, b"\0")[: self.length])
         self._opened = False
         self.full = True
 
     def take(self) -> bytes:
-        """The slave empties a mailbox that the master has written."""
+        """Take the message that the master has written to the mailbox."""
         self.full = False
         return bytes(self.data)
 
@@ -137,7 +137,7 @@ class Fmmu:
     start: int
     length: int
     end: int
-    """First logical byte address behind it."""
+    """First logical byte address after it."""
     start_bit: int
     stop_bit: int
     physical: int
@@ -147,11 +147,11 @@ class Fmmu:
 
     @property
     def bytewise(self) -> bool:
-        """Whole bytes only, the usual case."""
+        """Whether it maps whole bytes only, the usual case."""
         return self.start_bit == 0 and self.stop_bit == 7 and self.physical_bit == 0
 
     def bits(self, address: int, length: int) -> Iterator[tuple[int, int]]:
-        """Pairs of bits that lie in a datagram: place in its data, and in physical memory."""
+        """Yield pairs of bits within a datagram: position in its data, and in physical memory."""
         begin = self.start * 8 + self.start_bit
         end = (self.end - 1) * 8 + self.stop_bit + 1
         origin = self.physical * 8 + self.physical_bit - begin
@@ -161,7 +161,7 @@ class Fmmu:
 
 
 def parse_fmmu(raw: bytes) -> Fmmu | None:
-    """16 register bytes to a mapping, None while it is not activated."""
+    """Return the mapping of 16 register bytes; None while it is not activated."""
     start, length, start_bit, stop_bit, physical, physical_bit, kind, active = struct.unpack_from(
         "<IHBBHBBB", raw
     )

@@ -1,6 +1,6 @@
-"""Trouble of the wire itself: lost, late and damaged frames, wrong working counters.
+"""Faults of the cable: lost, delayed and damaged frames, wrong working counters.
 
-Trouble inside a slave (slow, mute, refusing) sits in the part that has it.
+Faults inside a slave (slow, mute, refusing) are part of the module concerned.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Fate:
-    """What happens to one frame."""
+    """Effects of the faults on one frame."""
 
     lost_outbound: bool = False
     lost_inbound: bool = False
     corrupt_at: tuple[int, int] | None = None
     """Slave and port where it arrives damaged."""
     delay_ns: int = 0
-    """The reply comes back late."""
+    """The reply is delayed."""
     hold_ns: int = 0
     """The frame reaches the slaves late, and so its reply is late as well."""
     counter_offset: int = 0
@@ -29,7 +29,7 @@ NO_TROUBLE = Fate()
 
 @dataclass(slots=True)
 class _Rule:
-    """Applies to the next ``count`` frames (None: until further notice), each by ``chance``."""
+    """Applies to the next ``count`` frames (None: no limit), each with probability ``chance``."""
 
     count: int | None
     chance: float
@@ -38,7 +38,7 @@ class _Rule:
 
 
 class Trouble:
-    """Rules in force; several may apply to the same frame."""
+    """Active rules; several may apply to the same frame."""
 
     def __init__(self, source: random.Random) -> None:
         self._random = source
@@ -46,13 +46,13 @@ class Trouble:
         self.counted = {"lost": 0, "late": 0, "corrupt": 0, "counter": 0}
 
     def clear(self) -> None:
-        """Peace."""
+        """Remove all rules."""
         self._rules.clear()
 
     def add(
         self, fate: Fate, count: int | None = None, chance: float = 1.0, cyclic_only: bool = False
     ) -> None:
-        """Put a rule in force."""
+        """Add a rule."""
         if not 0.0 < chance <= 1.0:
             raise ValueError(f"chance {chance} must lie above 0 and not above 1")
         if count is not None and count < 1:
@@ -60,7 +60,7 @@ class Trouble:
         self._rules.append(_Rule(count, chance, cyclic_only, fate))
 
     def frame_fate(self, cyclic: bool) -> Fate:
-        """Fate of the frame that has just come; counts rules down."""
+        """Return the effects on the present frame; counts the rules down."""
         if not self._rules:
             return NO_TROUBLE
         outbound = inbound = False
