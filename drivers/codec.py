@@ -33,7 +33,11 @@ def encode(data_type: DataType, raw: Raw) -> bytes:
     if data_type == "OCTETS":
         return _octets(raw)
     if data_type == "STRING":
-        return raw.encode("utf-8") if isinstance(raw, str) else bytes([int(raw)])
+        if isinstance(raw, str):
+            return raw.encode("utf-8")
+        if raw not in range(256):  # NaN and numbers with a fraction neither
+            raise OutOfRange("link.not-number", value=raw, data_type=data_type)
+        return bytes([int(raw)])
     if isinstance(raw, str) or (isinstance(raw, bool) and data_type != "BOOL"):
         raise OutOfRange("link.not-number", value=raw, data_type=data_type)
     if not abs(raw) <= _LARGEST:  # also true for NaN

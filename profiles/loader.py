@@ -219,9 +219,9 @@ def _explain(merged: dict[str, Any], error: ValidationError) -> str:
 
 def _cache_path(drive: str, files: list[Path]) -> Path:
     digest = hashlib.sha256()
-    schema = (_HERE / name for name in ("schema.py", "functions.py", "record.py"))
-    motion = (*sorted((_HERE / "motion").glob("*.py")), STANDARD_FILE)
-    for path in [*schema, *motion, HELP_FILE, Path(__file__), *files]:
+    # Whatever shapes a profile: one that an earlier version stored would lack what is new.
+    code = (*sorted(_HERE.glob("*.py")), *sorted((_HERE / "motion").glob("*.py")))
+    for path in [*code, STANDARD_FILE, HELP_FILE, *files]:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     folder = Path(os.environ.get("SERVODECK_CACHE") or platformdirs.user_cache_dir("servodeck"))

@@ -137,18 +137,15 @@ class SdoChannel:
         self._unanswered.add(mux)
         self._send(sdo.abort_frame(mux, sdo.ABORT_TIMED_OUT))
         index, subindex = int.from_bytes(mux[:2], "little"), mux[2]
-        raise (
-            _BlockUnanswered
-            if opens_block
-            else LinkTimeout(
-                "canopen.node-not-answer-about",
-                parameter=f"{index:04X}:{subindex:02X}",
-                limit=f"{timeout_s:g} s",
-                node=self.node,
-                index=index,
-                subindex=subindex,
-                timeout_s=timeout_s,
-            )
+        kind = _BlockUnanswered if opens_block else LinkTimeout
+        raise kind(
+            "canopen.node-not-answer-about",
+            parameter=f"{index:04X}:{subindex:02X}",
+            limit=f"{timeout_s:g} s",
+            node=self.node,
+            index=index,
+            subindex=subindex,
+            timeout_s=timeout_s,
         )
 
     def _wait_out_late_answers(self, timeout_s: float) -> None:

@@ -38,6 +38,10 @@ def test_text_in_another_code_page_keeps_its_letters() -> None:
         ("OCTETS", "speed"),  # letters where bytes are meant: 73 70 65 … must not reach the drive
         ("OCTETS", "0a f"),
         ("OCTETS", 256),
+        ("STRING", 256),
+        ("STRING", -1),
+        ("STRING", 1.5),
+        ("STRING", math.nan),
         ("INT16", math.nan),
         ("INT16", math.inf),
         ("INT16", 1.5),

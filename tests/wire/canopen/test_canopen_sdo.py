@@ -177,6 +177,25 @@ def test_long_objects_really_use_block_transfer_where_offered() -> None:
     assert 0x60 in without.first_bytes
 
 
+def test_a_node_that_ignores_block_requests_gets_segments() -> None:
+    """A node without block transfer should refuse the request; some do not answer at all."""
+    long, back = bytes(range(256)) * 8, bytes(range(255, -1, -1)) * 8
+    memory, ignored = Memory(long), list[int]()
+
+    def send(frame: bytes) -> None:
+        if frame[0] in sdo.BLOCK_REQUESTS:
+            ignored.append(frame[0])
+            return
+        for answer in memory.server.request(frame):
+            channel.deliver(answer)
+
+    channel = SdoChannel(1, send)
+    channel.write(0x2000, 0, back, 0.05)
+    assert memory.data == back
+    assert channel.read(0x2000, 0, 0.05) == back
+    assert (len(ignored), channel.no_block_transfer) == (1, True)
+
+
 def test_a_block_lost_in_part_is_sent_again() -> None:
     memory = Memory(bytes(range(100)))
     lost = iter([True, False])
