@@ -17,17 +17,14 @@ export const frame = {
   'stop.none': ['STOP received. No axis is connected.', '已收到停止命令，当前没有连接的轴。'],
   'stop.failed': ['STOP did not reach {name}:', '停止命令未到达 {name}：'],
   'stop.unknown': [
-    'STOP was sent, but its effect is not known.',
-    '已发送停止命令，但不清楚是否到达。',
+    'STOP was sent, but whether the axes stopped is not known.',
+    '已发送停止命令，但不知道各轴是否已停止。',
   ],
   'stop.unreachable': ['STOP could not be sent: no connection.', '无法发送停止命令：没有连接。'],
-  'stop.taken': [
-    'Quick stop sent. Verifying standstill…',
-    '快速停止命令已发出，正在测量各轴是否静止…',
-  ],
+  'stop.taken': ['Quick stop sent. Verifying standstill…', '已发送快速停止，正在确认各轴是否静止…'],
   'stop.coasting': [
     '{name} has no power and coasts, {speed}.',
-    '{name} 已断电，正在自由停车，{speed}。',
+    '{name} 已断电，正以 {speed} 自由停车。',
   ],
   'stop.still_moving': ['{name} is still moving at {speed}.', '{name} 仍在运动，{speed}！'],
   'stop.keepAway': ['Keep clear until it is at standstill.', '静止之前请勿靠近。'],
@@ -46,7 +43,7 @@ export const frame = {
   'stop.step.quick_stop_option_restored': ['option restored', '选项已恢复'],
   'stop.step.trigger_cleared': [
     "trigger of the drive's own motion cleared",
-    '已撤销驱动器自身的运动',
+    '已清除驱动器自身运动的触发',
   ],
   'stop.step.brake_applied': ['holding brake applied', '抱闸已抱紧'],
   'stop.step.voltage_disabled': ['power switched off', '已切断动力'],
@@ -54,18 +51,21 @@ export const frame = {
     "process data ended, so that the drive's watchdog trips",
     '已结束过程数据，使驱动器看门狗动作',
   ],
-  'turning.disabled': ['{name} turns without power, {speed}.', '{name} 未使能却在转动，{speed}。'],
+  'turning.disabled': [
+    '{name} turns without power at {speed}.',
+    '{name} 未使能，却以 {speed} 转动。',
+  ],
   'turning.disabled.help': [
-    'Cause: moved by hand, by gravity, or by the drive itself.',
-    '可能是手动转动、重力所致，或驱动器自行使其运动。',
+    'It may be moved by hand, by gravity, or by the drive itself.',
+    '可能原因：手动转动、重力，或驱动器自行运动。',
   ],
   'turning.without_grant': [
-    '{name} is enabled and turns, {speed}, although no motion was started here.',
-    '{name} 已使能并在转动，{speed}，但此处无人使其运动。',
+    '{name} is enabled and turns at {speed}, although no motion was started here.',
+    '{name} 已使能并以 {speed} 转动，但此处未启动任何运动。',
   ],
   'turning.without_grant.help': [
-    'Another controller or the drive itself moves it. STOP works.',
-    '是其他程序或驱动器自身使其运动。可以使用停止按钮。',
+    'Another controller or the drive itself moves it. Press STOP to stop it.',
+    '其他控制器或驱动器自身使其运动。按“停止”可将其停止。',
   ],
   'stop.useHardware': ['Use the emergency stop of the machine.', '请使用机器的急停按钮。'],
   close: ['Close', '关闭'],
@@ -79,7 +79,7 @@ export const frame = {
     '此页面尚未加载。连接恢复后会自动显示。',
   ],
   source: ['Source: manual {source}', '出处：手册 {source}'],
-  'broken.title': ['This page has a defect.', '此页面出现缺陷。'],
+  'broken.title': ['This page failed.', '此页面出错。'],
   'broken.text': [
     'STOP still works. Choose another page, or load this one again.',
     '停止按钮仍然有效。请选择其他页面或重新加载。',
@@ -140,8 +140,8 @@ export const frame = {
   'bit.homing attained': ['homing attained', '回零完成'],
   'bit.homing error': ['homing error', '回零错误'],
   'bit.drive follows the command': ['drive follows the command', '驱动器跟随指令'],
-  'flag.target_reached': ['target reached', '到达目标'],
-  'flag.internal_limit': ['internal limit active', '内部限制有效'],
+  'flag.target_reached': ['target reached', '目标到达'],
+  'flag.internal_limit': ['internal limit active', '内部限值有效'],
   'link.none': ['No link', '无链路'],
   'link.lost': ['Link lost', '链路中断'],
   'link.good': ['Link good', '链路良好'],
@@ -171,7 +171,7 @@ export const frame = {
   'problem.try': ['What to try:', '建议：'],
   'problem.forgotten': [
     'The server was restarted; the outcome is not known.',
-    '服务器已重新启动；不知此任务如何结束。',
+    '服务器已重新启动，任务结果未知。',
   ],
   'problem.forgottenTry': [
     'check the state of the axis, then start again',
@@ -180,7 +180,7 @@ export const frame = {
   'problem.unreachable': ['The server does not answer.', '服务器无应答。'],
   'problem.unreachableTry': [
     'check the network; once the connection is back, check whether the change was made',
-    '检查网络；连接恢复后可看到更改是否生效',
+    '检查网络；连接恢复后请确认更改是否已执行',
   ],
   'job.done': ['{title}: done', '{title}：完成'],
   'job.cancelled': ['{title}: cancelled', '{title}：已取消'],

@@ -172,7 +172,7 @@ export const library = {
   'audit.what': ['What', '内容'],
   'audit.change': ['Old → new (raw)', '旧值 → 新值（原始）'],
   'audit.outcome': ['Outcome', '结果'],
-  'audit.ok': ['good', '正常'],
+  'audit.ok': ['succeeded', '成功'],
   'audit.none': ['No entry matches.', '没有符合的记录。'],
   'audit.more': ['Older entries', '更早的记录'],
   'audit.refresh': ['Refresh', '刷新'],

@@ -5,8 +5,8 @@ export const scene = {
   'page.scene': ['3D', '三维'],
   'scene.frame': ['The bench in 3D', '三维调试台'],
   'scene.help': [
-    'Parts move with the measured positions. Above each motor stand the name of its axis, its state and its place: I with torque, O without, ! with a fault, ? not known. Red posts are the software limits of the drive, the blue one is position zero. Drag to turn, wheel or two fingers to zoom. A track without limits grows as far as the axis was seen; its length has no scale.',
-    '部件随实测位置运动。每个电机上方为轴名、状态标记与位置：I 有转矩，O 无转矩，! 有故障，? 未知。红柱为驱动器软件限位，蓝柱为零位。拖动可旋转，滚轮或双指可缩放。无限位的导轨按轴到达过的范围伸长，长度不按比例。',
+    'Parts move with the measured positions. Above each motor: name of the axis, state and position. I: with torque, O: without, !: fault, ?: not known. Red posts are the software limits of the drive, the blue one is position zero. Drag to turn, wheel or two fingers to zoom. A track without limits extends over the positions seen so far; its length is not to scale.',
+    '部件随实测位置运动。每个电机上方为轴名、状态和位置。I：有转矩，O：无转矩，!：有故障，?：未知。红柱为驱动器软件限位，蓝柱为位置 0。拖动可旋转，滚轮或双指可缩放。无限位的导轨按轴到达过的范围伸长，长度不按比例。',
   ],
   'scene.states': ['States of the axes', '各轴状态'],
   'scene.none': ['No axis is connected yet.', '尚未连接任何轴。'],
