@@ -230,7 +230,7 @@ export const axis = {
   'signal.to': ['To frequency', '终止频率'],
   'signal.slope': ['Slope', '斜率'],
   'signal.duration': ['Duration', '持续时间'],
-  'signal.start': ['Start the signal', '开始信号'],
+  'signal.start': ['Start the signal', '启动信号'],
   'homing.title': ['Homing', '回零'],
   'homing.method': ['Method', '回零方式'],
   'homing.fast': ['Speed during search for switch', '搜索开关速度'],

@@ -46,7 +46,7 @@ export const frame = {
     '已清除驱动器自身运动的触发',
   ],
   'stop.step.brake_applied': ['holding brake applied', '抱闸已抱紧'],
-  'stop.step.voltage_disabled': ['power switched off', '已切断动力'],
+  'stop.step.voltage_disabled': ['power switched off', '已断电'],
   'stop.step.process_data_ended': [
     "process data ended, so that the drive's watchdog trips",
     '已结束过程数据，使驱动器看门狗动作',
@@ -207,7 +207,7 @@ export const frame = {
   'typed.high': ['at most {limit}', '至多 {limit}'],
   'identity.vendor': ['vendor', '厂商'],
   'identity.product': ['product', '产品'],
-  'identity.revision': ['revision', '版本'],
+  'identity.revision': ['revision', '修订号'],
   'identity.serial': ['serial number', '序列号'],
   'identity.hardware': ['hardware', '硬件'],
   'identity.firmware': ['firmware', '固件'],

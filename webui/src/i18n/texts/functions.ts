@@ -11,8 +11,8 @@ export const functions = {
   'fields.stopped': ['Can be set only while the axis is disabled.', '仅在轴未使能时可设置。'],
   'fields.about': ['About {name}', '关于 {name}'],
   'fields.none': [
-    'None of these parameters can be reached over the connected port.',
-    '所连接的端口无法访问这些参数。',
+    'None of these parameters can be reached over the connected port. Connect the other port of the drive.',
+    '所连接的端口无法访问这些参数。请连接驱动器的另一个端口。',
   ],
 
   'history.title': ['Past faults in the drive', '驱动器历史故障'],
@@ -25,7 +25,7 @@ export const functions = {
   'history.empty': ['No past fault is recorded.', '没有历史故障记录。'],
   'history.unknown': [
     'It is not known whether this drive keeps a record.',
-    '不了解此驱动器是否保存历史记录。',
+    '不知道此驱动器是否保存历史记录。',
   ],
   'history.notInProfile': ['not in the profile', '配置文件中没有'],
   'history.values': ['Values at the fault', '故障时的数值'],

@@ -69,7 +69,7 @@ export const handover = {
   ],
   'handover.noConflict': [
     'The controller overwrites nothing of this set.',
-    '控制器不会覆盖此参数集的任何值。',
+    '控制器不会覆盖此参数集中的任何值。',
   ],
   'handover.restored': [
     'These values in the drive differ from this set; the controller writes those of the set: {keys}',

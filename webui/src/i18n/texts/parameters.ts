@@ -146,7 +146,7 @@ export const parameters = {
     '{count} {count|value is|values are} now marked as edited in the table; nothing has been written yet.',
     '{count} 个值已在表格中标记为已编辑，尚未写入。',
   ],
-  'compare.theirs': ['Compared', '比较值'],
+  'compare.theirs': ['Compared value', '比较值'],
   'compare.drive': ['In the drive', '驱动器中'],
   'compare.tick': ['Choose {name}', '选择 {name}'],
   'compare.tickAll': ['Choose all', '全选'],

@@ -152,7 +152,7 @@ export const people = {
   'access.present': ['Current password', '当前密码'],
   'access.change': ['Change the password', '更改密码'],
   'access.changed': ['Changed. Your other log-ins have ended.', '已更改，您的其他登录已结束。'],
-  'access.sessions': ['Log-ins', '登录'],
+  'access.sessions': ['Active log-ins', '当前登录'],
   'access.used': ['last used {time}', '最近使用 {time}'],
   'access.end': ['End', '结束'],
   'access.tokens': ['Tokens for scripts', '脚本令牌'],

@@ -108,7 +108,7 @@ export const recordings = {
     '由于此页面过慢，丢弃了 {count} 个数据块；录制不受影响。',
   ],
   'rerun.stored': ['Stored recording: {name}', '已存录制：{name}'],
-  'rerun.lost': ['The connection is lost. It is tried again.', '连接已断开，正在重试。'],
+  'rerun.lost': ['The connection is lost. Trying again…', '连接已断开，正在重试。'],
   'rerun.broken': [
     'The viewer has failed. Close and open it again.',
     '查看器出现故障，请关闭后重新打开。',

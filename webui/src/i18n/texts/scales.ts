@@ -18,7 +18,7 @@ export const scales = {
   'scales.per': ['{value} raw per {unit}', '每 {unit} 对应 {value} 个原始值'],
   'scales.time': ['ramps are times in ms', '加减速以毫秒时间表示'],
   'scales.origin.manual': ['manual', '手册'],
-  'scales.origin.makers_file': ["maker's file", '厂商文件'],
+  'scales.origin.makers_file': ["maker's file", '厂家文件'],
   'scales.origin.drive': ['read from the drive', '从驱动器读取'],
   'scales.origin.user': ['stated by a person', '由人员给定'],
   'scales.origin.measured': ['measured', '测量得出'],

@@ -67,7 +67,7 @@ export const tuning = {
   ],
   'sweep.moves': [
     'WARNING: the axis is enabled and excited with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of the present position and below {speed} rpm, returns, and is disabled. Keep everyone clear of the machine.',
-    '警告：轴将使能并以约 {part}%（最大 {torque}%）额定转矩激振，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
+    '警告：轴将使能并以约 {part}%（最大 {torque}%）额定转矩激励，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
   ],
   'sweep.movesLoop': [
     'WARNING: the axis is enabled and follows a small, fast changing command, with at most {torque} % of rated torque. It stays within ±{travel} rev of the present position and below {speed} rpm, returns, and is disabled. Keep everyone clear of the machine.',
@@ -124,7 +124,7 @@ export const tuning = {
   'margin.gain': ['Gain margin', '增益裕度'],
   'margin.ms': ['Peak sensitivity Ms', '最大灵敏度 Ms'],
   'margin.at': ['at {frequency}', '于 {frequency}'],
-  'margin.unstable': ['This loop is not stable.', '该环路不稳定。'],
+  'margin.unstable': ['This loop is not stable. Lower the gains.', '该环路不稳定。请降低增益。'],
   'margin.before': ['(before: {value})', '（之前：{value}）'],
   'guide.closed': ['−3 dB: bandwidth', '−3 dB：带宽'],
   'guide.open': ['0 dB: crossover', '0 dB：穿越'],
@@ -195,8 +195,8 @@ export const tuning = {
     '三个或更多峰：多个柔性部件串联。请先加强刚性最低的部件（频率最低的峰）。',
   ],
   'shape.hint.untrusted': [
-    'No mechanical model explains this curve. The usual causes are backlash, a sticking guide or a hard stop.',
-    '没有机械模型能解释该曲线。常见原因：间隙、导轨卡滞或碰到挡块。',
+    'No mechanical model explains this curve. The usual causes are backlash, a sticking guide or an end stop. Check them, then measure again.',
+    '没有机械模型能解释该曲线。常见原因：间隙、导轨卡滞或碰到机械限位。请检查后重新测量。',
   ],
   'shape.rigid': ['A straight line', '直线'],
   'shape.rigid.text': [
@@ -263,7 +263,10 @@ export const tuning = {
     '驱动器实际：{center}，宽 {width}，{depth}',
   ],
   'notch.dc': ['and changes the gain below it by {gain}', '并使低频增益改变 {gain}'],
-  'notch.unstable': ['This filter is not stable.', '该滤波器不稳定。'],
+  'notch.unstable': [
+    'This filter is not stable. Change its centre, width or depth.',
+    '该滤波器不稳定。请更改其中心、宽度或深度。',
+  ],
   'notch.edited': ['edited, not written', '已编辑，未写入'],
   'notch.write': ['Write the notches', '写入陷波'],
   'notch.read': ['Read them again', '重新读取'],
@@ -332,13 +335,13 @@ export const tuning = {
   ],
   'tune.ok.pending': ['No change is pending.', '所有已写参数均已生效。'],
   'tune.no.pending': [
-    'Parameters are not in effect yet; write the settings or restart the drive. Number:',
-    '有参数等待生效；请写入设置或重启驱动器。数量：',
+    'Parameters are not in effect yet. Write the settings or restart the drive. Number of parameters:',
+    '有参数尚未生效。请写入设置或重启驱动器。参数数量：',
   ],
   'tune.ok.cyclic': ['Its bus can exchange process data.', '总线可交换过程数据。'],
   'tune.no.cyclic': [
-    'Its bus cannot exchange process data in every cycle, so nothing can be measured.',
-    '总线无法周期通信过程数据，因此无法测量。',
+    'Its bus cannot exchange process data in every cycle, so nothing can be measured. Connect the drive over EtherCAT or CANopen with SYNC.',
+    '总线无法周期通信过程数据，因此无法测量。请通过 EtherCAT 或带 SYNC 的 CANopen 连接驱动器。',
   ],
   'tune.ok.exchange': ['The cyclic exchange runs.', '周期通信正在运行。'],
   'tune.no.exchange': [
@@ -422,8 +425,8 @@ export const tuning = {
     '警告：轴将使能并运动多次，限制在当前位置 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内，之后断使能。请确保无人靠近。',
   ],
   'inertia.movesLimited': [
-    'WARNING: the axis is enabled and moves slowly against both stops, over at most {travel} rev each. Then it moves several times between them, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
-    '警告：轴将使能并缓慢触碰两端挡块，每次最多 {travel} 转；随后在两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
+    'WARNING: the axis is enabled and moves slowly against both end stops, over at most {travel} rev each. Then it moves several times between them, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
+    '警告：轴将使能并缓慢触碰两端机械限位，每次最多 {travel} 转；随后在两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
   ],
   'inertia.movesTaught': [
     'WARNING: the axis is enabled and moves several times between the taught ends, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
@@ -435,8 +438,8 @@ export const tuning = {
   'inertia.scheme.taught': ['Limited: taught ends', '受限：示教两端'],
   'inertia.help.free': ['Moves to both sides of the present position.', '在当前位置两侧运动。'],
   'inertia.help.limited': [
-    'First moves slowly against both stops with limited torque, within the travel limit.',
-    '先以限制转矩缓慢触碰两端挡块，最远不超过行程限制。',
+    'First moves slowly against both end stops with limited torque, within the travel limit.',
+    '先以限制转矩缓慢触碰两端机械限位，最远不超过行程限制。',
   ],
   'inertia.help.taught': [
     'Jog to each end on the Motion page and adopt the position here.',
@@ -548,7 +551,7 @@ export const tuning = {
   'autotune.apply': ['Write and verify the result', '写入并验证结果'],
   'autotune.moves': [
     'WARNING: the axis is enabled and moves several times for about a minute (reciprocating moves, excitation and steps), within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Keep everyone clear of the machine.',
-    '警告：轴将使能并运动多次，约一分钟：往复、激振和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近。',
+    '警告：轴将使能并运动多次，约一分钟：往复运动、激励和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近。',
   ],
   'autotune.start': ['Start tuning', '开始整定'],
   'autotune.step.1': ['Pre-checks', '预检查'],
