@@ -223,7 +223,7 @@ export const axis = {
   'signal.ramp': ['ramp', '斜坡'],
   'signal.trapezoid': ['trapezoid', '梯形'],
   'signal.sine': ['sine', '正弦'],
-  'signal.chirp': ['chirp', '扫频'],
+  'signal.chirp': ['chirp', '扫频信号'],
   'signal.amplitude': ['Amplitude', '幅值'],
   'signal.frequency': ['Frequency', '频率'],
   'signal.from': ['From frequency', '起始频率'],

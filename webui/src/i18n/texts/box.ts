@@ -25,6 +25,6 @@ export const box = {
     '服务器从不在此网口发送 EtherCAT 帧。该网口没有 IP 地址时，不会公布站名。',
   ],
   'box.here': ['this page', '本页面'],
-  'box.down': ['no link', '无连接'],
+  'box.down': ['no link', '无链路'],
   'box.keep': ['Save', '保存'],
 } satisfies Texts

@@ -17,7 +17,7 @@ export const imported = {
   'import.output': ['Output: motion', '输出：运动'],
   'import.inputUnit': ['Unit of the input', '输入单位'],
   'import.outputUnit': ['Unit of the output', '输出单位'],
-  'import.unit.1': ['as it is', '不换算'],
+  'import.unit.1': ['no conversion', '不换算'],
   'import.unit.rated': ['share of rated torque', '额定转矩的倍数'],
   'import.unit.percent': ['% of rated torque', '额定转矩的 %'],
   'import.unit.permille': ['‰ of rated torque', '额定转矩的 ‰'],

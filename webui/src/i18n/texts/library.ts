@@ -107,8 +107,8 @@ export const library = {
   'page.audit': ['Audit', '审计'],
   'audit.title': ['Who did what', '操作记录'],
   'audit.help': [
-    'Every write, motion, log-in, file action and change of control, in a chain that shows any later change.',
-    '每次写入、运动、登录、文件操作和控制权变更均记入链中，任何事后修改都会显露。',
+    'Every write, motion, log-in, file action and change of control. The entries form a chain that reveals any later change.',
+    '每次写入、运动、登录、文件操作和控制权变更均有记录。各条记录构成链，任何事后修改都会显露。',
   ],
   'audit.kind': ['Kind', '类型'],
   'audit.kind.all': ['Everything', '全部'],

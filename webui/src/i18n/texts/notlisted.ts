@@ -53,7 +53,7 @@ export const notListed = {
     'Tries the usual settings at the stations given above (station 1 if none). Only reads are sent.',
     '在上面给出的站地址（未填则为 1）尝试常用设置，仅进行读取。',
   ],
-  'line.found': ['Answers with {url}', '应答设置：{url}'],
+  'line.found': ['It answers with {url}', '应答设置：{url}'],
   'line.use': ['Use it', '使用'],
   'line.none': [
     'Nothing answered at any of these settings. Check power, wiring and the station address.',

@@ -94,7 +94,7 @@ export const parameters = {
   'mark.refused': ['refused', '被拒绝'],
   'mark.unread': ['unread', '未读取'],
   'mark.unused': ['not in use', '未使用'],
-  'mark.stopped': ['set at standstill', '静止时设置'],
+  'mark.stopped': ['set at stop', '静止时设置'],
   'mark.readOnly': ['read only', '只读'],
   'mark.energises': ['moves', '可致运动'],
   'motion.energises': [

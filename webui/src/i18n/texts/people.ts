@@ -139,7 +139,7 @@ export const people = {
   'support.guestHere': ['{name} is here as a guest.', '访客 {name} 在线。'],
   'support.goWhere': ['Go to their page', '前往其页面'],
   'support.hold': ['Hold to let it move', '按住以允许运动'],
-  'support.holding': ['Motion enabled', '运动已使能'],
+  'support.holding': ['Motion enabled', '已允许运动'],
   'support.enabled': ['Enabled from site', '现场已使能'],
   'support.notEnabled': ['Not enabled from site', '现场未使能'],
   'support.grantWhat': ['Grant', '授予'],

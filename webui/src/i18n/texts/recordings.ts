@@ -65,7 +65,7 @@ export const recordings = {
   'recordings.mask': ['Only these bits (mask as a number)', '仅这些位（掩码数值）'],
   'recordings.before': ['Time before the trigger', '触发前时间'],
   'recordings.seconds': ['Ends after', '持续时间'],
-  'recordings.arm': ['Arm', '等待触发'],
+  'recordings.arm': ['Arm', '启动触发'],
   'recordings.beginNow': ['Begin now', '立即开始'],
   'recordings.remarks': ['Notes and tags', '备注与标签'],
   'recordings.keep': ['Keep: never delete it automatically', '保留：不自动删除'],

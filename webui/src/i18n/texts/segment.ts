@@ -15,7 +15,7 @@ export const segment = {
     '在图中选择驱动器以查看端口、别名和状态。',
   ],
   'segment.cable.errors': ['errors', '有错误'],
-  'segment.cable.broken': ['no link', '无连接'],
+  'segment.cable.broken': ['no link', '无链路'],
   'segment.brokenBetween': [
     'No communication between station {before} and station {station}: cable cut, or the supply of station {station} is off. It is connected again automatically.',
     '站 {before} 与站 {station} 之间无通信：电缆断开，或站 {station} 断电。恢复后自动重新连接。',

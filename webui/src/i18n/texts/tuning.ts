@@ -31,7 +31,10 @@ export const tuning = {
   'sweep.loop.none': ['none (torque mode)', '无（转矩模式）'],
   'sweep.loop.speed': ['speed', '速度'],
   'sweep.loop.position': ['position', '位置'],
-  'sweep.highHelp': ['empty: as far as the bus rate allows', '留空：总线频率允许的最高值'],
+  'sweep.highHelp': [
+    'empty: the highest frequency that the bus rate allows',
+    '留空：总线频率允许的最高值',
+  ],
   'sweep.excitation': ['Signal', '激励信号'],
   'sweep.excitation.multisine': ['multisine', '多正弦'],
   'sweep.excitation.chirp': ['chirp', '扫频信号（chirp）'],
@@ -490,7 +493,7 @@ export const tuning = {
   'gains.current': ['Current loop', '电流环'],
   'gains.level': ['Stiffness level', '刚性等级'],
   'gains.writeLevel': ['Write this level', '写入该等级'],
-  'gains.own': ['Own gains', '自定义增益'],
+  'gains.own': ['Individual gains', '单独设置增益'],
   'gains.takeInertia': ['Use the measured inertia: {value} kg·m²', '使用测得惯量：{value} kg·m²'],
   'gains.write': ['Write the gains', '写入增益'],
   'gains.confirm': [
