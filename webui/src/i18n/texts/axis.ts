@@ -177,7 +177,7 @@ export const axis = {
     '以给定速度运行指定时间后停止。',
   ],
   'move.help.PT': [
-    'Holds a torque for the time given, then stops. Without load the axis accelerates up to the speed limit.',
+    'Holds a torque for the time given, then stops. An axis without load accelerates.',
     '保持给定转矩指定时间后停止。空载轴会加速。',
   ],
   'move.target': ['Target', '目标'],

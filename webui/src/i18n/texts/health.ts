@@ -47,8 +47,8 @@ export const health = {
     '此轴未获准无人值守运行。',
   ],
   'health.permits': [
-    '{person} permits runs without a person until {until}.',
-    '{person} 准许无人值守运行，至 {until}。',
+    '{person} permits these runs until {until}.',
+    '{person} 准许这些运行，至 {until}。',
   ],
   'health.onDays': ['Schedule: {days} at {at}.', '计划：{days} {at}。'],
   'health.byTrigger': [

@@ -540,8 +540,8 @@ export const tuning = {
   ],
   'autotune.title': ['Tune automatically', '自动整定'],
   'autotune.help': [
-    'Measures inertia and response, computes notches and gains, writes them, and measures again. Settings that miss the predicted margins are restored. Every step can be cancelled; the drive is then as before.',
-    '测量惯量和响应，计算陷波和增益，写入后再次测量。未达到预测裕度的设置会被恢复。每一步都可取消，取消后驱动器恢复原状。',
+    'Measures inertia and response, computes notches and gains, writes them, and measures again. If the result misses the predicted margins, the previous settings are restored. Every step can be cancelled; the drive is then as before.',
+    '测量惯量和响应，计算陷波和增益，写入后再次测量。若结果未达到预测裕度，则恢复原有设置。每一步都可取消，取消后驱动器恢复原状。',
   ],
   'autotune.motorHelp': [
     'from the data sheet; needed if the drive sets the load as a ratio to the motor and does not report the motor inertia',
