@@ -9,7 +9,7 @@ export const scales = {
   ],
   'scales.certain': ['Position and speed are certain.', '位置和速度的标度已确定。'],
   'scales.uncertain': [
-    'The axis cannot be moved in units.',
+    'The axis cannot be moved in units. Teach or state the scale below.',
     '无法按单位移动该轴。请在下方示教或给定标度。',
   ],
   'scales.quantity.position': ['Position', '位置'],
