@@ -85,7 +85,7 @@ export const parameters = {
   'column.value': ['Value', '值'],
   'column.unit': ['Unit', '单位'],
   'column.range': ['Range', '范围'],
-  'column.default': ['Default', '默认'],
+  'column.default': ['Default', '默认值'],
   'column.marks': ['Marks', '标记'],
   'mark.edited': ['edited', '已编辑'],
   'mark.unsaved': ['in drive, not saved', '在驱动器中，未保存'],

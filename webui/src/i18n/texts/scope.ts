@@ -68,8 +68,8 @@ export const scope = {
     'The samples are not equally spaced and were interpolated, so only low frequencies are reliable.',
     '采样间隔不均匀，已插值到等距网格，仅低频部分可信。',
   ],
-  'xy.across': ['Horizontal axis', '横轴'],
-  'xy.up': ['Vertical axis', '纵轴'],
+  'xy.across': ['Horizontal', '横轴'],
+  'xy.up': ['Vertical', '纵轴'],
   'maths.help': [
     'Numbers, pi, the traces by their names (c1, m1, in the units shown), + − * / ^ and {functions}. Filters take a frequency in Hz, mean a time in s, bit a number.',
     '可用：数字、pi、曲线名（c1、m1，按所示单位）、+ − * / ^ 以及 {functions}。滤波器参数为频率 (Hz)，mean 为时间 (s)，bit 为位号。',
