@@ -21,10 +21,10 @@ export const box = {
   'box.ethercat': ['Port of the drives (EtherCAT)', '驱动器网口（EtherCAT）'],
   'box.office': ['Port of the office', '办公网口'],
   'box.officeHelp': [
-    'The server never sends EtherCAT frames on this port. Without an address on it the name is not announced.',
-    '无论谁发出请求，服务器都不会在此发送 EtherCAT。该网口没有地址时，不会公布名称。',
+    'The server never sends EtherCAT frames on this port. Without an IP address on this port, the name of the station is not announced.',
+    '服务器从不在此网口发送 EtherCAT 帧。该网口没有 IP 地址时，不会公布站名。',
   ],
   'box.here': ['this page', '本页面'],
-  'box.down': ['no link', '无连接'],
+  'box.down': ['no link', '无链路'],
   'box.keep': ['Save', '保存'],
 } satisfies Texts

@@ -2,7 +2,7 @@ import type { Texts } from '../types'
 
 /** Words of the server and its profiles: the key ends with the English text that it sends. */
 export const drive = {
-  'profileText.untranslated': ['not translated yet', '尚未翻译，显示手册原文'],
+  'profileText.untranslated': ['not translated yet: text of the manual', '尚未翻译，显示手册原文'],
   'profileText.mark': ['EN', '英文'],
   'profileText.original': ['Show the English original', '同时显示英文原文'],
   'procedure.Clear the alarm': ['Clear the alarm', '清除报警'],
@@ -24,7 +24,7 @@ export const drive = {
   'procedure.Motor installation': ['Motor installation', '电机安装辨识'],
   'procedure.Magnetic pole identification': ['Magnetic pole identification', '磁极辨识'],
   'procedure.Restart the drive': ['Restart the drive', '重启驱动器'],
-  'procedure.Restore defaults': ['Restore defaults', '恢复默认值'],
+  'procedure.Restore defaults': ['Restore defaults', '恢复出厂参数'],
   'procedure.Restore factory defaults': ['Restore factory defaults', '恢复出厂默认值'],
   'procedure.Restore factory parameters': ['Restore factory parameters', '恢复出厂参数'],
   'procedure.Restore factory settings': ['Restore factory settings', '恢复出厂设置'],
@@ -70,8 +70,8 @@ export const drive = {
   'problemTitle.not-found': ['Not found', '未找到'],
   'problemTitle.not-logged-in': ['Not logged in', '未登录'],
   'problemTitle.forbidden': ['Forbidden', '禁止'],
-  'problemTitle.too-often': ['Too often', '过于频繁'],
-  'problemTitle.wrong-method': ['Wrong method', '方法错误'],
+  'problemTitle.too-often': ['Too often', '请求过于频繁'],
+  'problemTitle.wrong-method': ['Wrong method', '不允许的 HTTP 方法'],
   'problemTitle.internal': ['Internal error', '内部错误'],
   'problemTitle.bad-request': ['Bad request', '请求无效'],
   'problemTitle.http': ['Request failed', '请求失败'],
@@ -81,8 +81,8 @@ export const drive = {
   'problemTitle.backup-failed': ['Not backed up', '备份失败'],
   'problemTitle.state-refused': ['State folder refused', '状态文件夹被拒绝'],
   'problemTitle.accounts-gone': ['Accounts are missing', '账户缺失'],
-  'problemTitle.scale-unknown': ['Scale unknown', '换算未知'],
-  'problemTitle.scale-changed': ['Scale changed', '换算已更改'],
+  'problemTitle.scale-unknown': ['Scale unknown', '标度未知'],
+  'problemTitle.scale-changed': ['Scale changed', '标度已更改'],
   'problemTitle.body': ['Body refused', '请求内容被拒绝'],
   'problemTitle.drive-error': ['Drive error', '驱动器错误'],
 } satisfies Texts

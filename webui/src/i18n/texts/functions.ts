@@ -8,11 +8,11 @@ export const functions = {
   'fields.discard': ['Discard', '放弃'],
   'fields.waits': ['takes effect later', '稍后生效'],
   'fields.unsaved': ['not saved', '未保存'],
-  'fields.stopped': ['Set while the motor is not enabled.', '仅在电机未使能时可设置。'],
+  'fields.stopped': ['Can be set only while the axis is disabled.', '仅在轴未使能时可设置。'],
   'fields.about': ['About {name}', '关于 {name}'],
   'fields.none': [
-    'None of these parameters can be reached over the connected port.',
-    '所连接的端口无法访问这些参数。',
+    'None of these parameters can be reached over the connected port. Connect the other port of the drive.',
+    '所连接的端口无法访问这些参数。请连接驱动器的另一个端口。',
   ],
 
   'history.title': ['Past faults in the drive', '驱动器历史故障'],
@@ -25,7 +25,7 @@ export const functions = {
   'history.empty': ['No past fault is recorded.', '没有历史故障记录。'],
   'history.unknown': [
     'It is not known whether this drive keeps a record.',
-    '不了解此驱动器是否保存历史记录。',
+    '不知道此驱动器是否保存历史记录。',
   ],
   'history.notInProfile': ['not in the profile', '配置文件中没有'],
   'history.values': ['Values at the fault', '故障时的数值'],
@@ -43,7 +43,7 @@ export const functions = {
   'bundle.armed': ['A fault creates one automatically.', '发生故障时自动生成。'],
   'bundle.notArmed': [
     'Faults do not create one: this is switched off.',
-    '故障时不自动生成（已关闭）。',
+    '故障时不自动生成：此功能已关闭。',
   ],
   'bundle.none': ['There is none yet.', '尚无支持包。'],
 
@@ -60,8 +60,8 @@ export const functions = {
   ],
   'io.writeAnyway': ['Write anyway', '仍然写入'],
   'io.noFunction': ['The manual gives no parameter for the function.', '手册未给出功能参数。'],
-  'io.objects': ['As in the objects', '按对象显示'],
-  'io.stopFirst': ['Disable the axis to change functions.', '请在电机未使能时更改功能。'],
+  'io.objects': ['Values of the objects', '对象的值'],
+  'io.stopFirst': ['Disable the axis to change functions.', '请先断使能，再更改功能。'],
   'io.force.begin': ['Begin', '开始'],
   'io.force.end': ['End and restore', '结束并恢复'],
   'io.force.agree': [
@@ -104,16 +104,16 @@ export const functions = {
   'gains.picture': ['Control loops', '控制环'],
   'block.level': ['Stiffness level', '刚性等级'],
   'block.inertia': ['Inertia', '惯量'],
-  'block.command_filter': ['Command filter', '指令滤波'],
+  'block.command_filter': ['Command filter', '指令滤波器'],
   'block.position': ['Position loop', '位置环'],
   'block.speed_ff': ['Speed feed-forward', '速度前馈'],
   'block.speed': ['Speed loop', '速度环'],
   'block.torque_ff': ['Torque feed-forward', '转矩前馈'],
-  'block.torque_filter': ['Torque filter', '转矩滤波'],
+  'block.torque_filter': ['Torque filter', '转矩滤波器'],
   'block.notch': ['Notches', '陷波器'],
   'block.adaptive': ['Adaptive notch', '自适应陷波'],
   'block.current': ['Current loop', '电流环'],
-  'block.feedback_filter': ['Feedback filter', '反馈滤波'],
+  'block.feedback_filter': ['Feedback filter', '反馈滤波器'],
   'block.switching': ['Gain switching', '增益切换'],
   'block.compensation': ['Compensation', '补偿'],
   'block.limits': ['Limits', '限制'],
@@ -132,15 +132,15 @@ export const functions = {
   ],
   'blockHelp.position': [
     'A higher value follows more closely and settles sooner, until the axis overshoots. Keep it at one fifth to one third of the speed loop.',
-    '越大跟随越紧、调节越快，直至超调。最多为速度环的三分之一到五分之一。',
+    '越大跟随越紧、调节越快，直至超调。请保持为速度环的五分之一到三分之一。',
   ],
   'blockHelp.speed_ff': [
     'Adds the commanded speed directly, before a following error builds up.',
-    '在误差形成之前把指令速度交给速度环。',
+    '在跟随误差形成之前直接加入指令速度。',
   ],
   'blockHelp.speed': [
     'A higher value is stiffer against forces, until the axis oscillates. A shorter integral time or higher integral frequency removes standing errors sooner.',
-    '越大越能抵抗外力，直至出现啸叫。积分时间越短或频率越高，静差消除越快。',
+    '越大越能抵抗外力，直至出现振荡。积分时间越短（或积分频率越高），静差消除越快。',
   ],
   'blockHelp.torque_ff': [
     'Adds the torque that the acceleration will need. Needs the right inertia.',
@@ -152,7 +152,7 @@ export const functions = {
   ],
   'blockHelp.notch': [
     'Suppress narrow resonances. Place them on the Response page, from a measurement.',
-    '消除窄带谐振。请在响应页面根据测量设置。',
+    '抑制窄带谐振。请在响应页面根据测量设置。',
   ],
   'blockHelp.adaptive': [
     'The drive places notches automatically while the axis moves.',
@@ -171,7 +171,7 @@ export const functions = {
     'Removes known forces: friction, gravity, disturbances.',
     '补偿已知的力：摩擦、重力、扰动。',
   ],
-  'blockHelp.limits': ['Loop output limits.', '各环输出的上限。'],
+  'blockHelp.limits': ['Loop output limits.', '各环路的输出限值。'],
 
   'setup.tab.gear': ['Units', '单位'],
   'setup.tab.brake': ['Brake', '抱闸'],
@@ -241,17 +241,17 @@ export const functions = {
   'brake.speed': ['speed', '速度'],
   'brake.noOutput': [
     'No output has the function brake. Assign one on the I/O page if the drive controls the brake.',
-    '没有输出端子设为抱闸功能。请在输入输出页面设置，或抱闸另行接线。',
+    '没有输出端子设为抱闸功能。若由驱动器控制抱闸，请在“输入输出”页面指定一个输出。',
   ],
   'brake.outputIs': ['Brake output: {name}', '抱闸输出：{name}'],
   'brake.warning': [
     'WARNING: a brake that closes too late lets a vertical axis drop. NOTICE: a brake that closes on a turning motor wears out.',
-    '警告：抱闸过晚会使垂直轴下落。注意：电机旋转时抱闸会加剧磨损。',
+    '警告：抱闸闭合过晚会使垂直轴下落。注意：抱闸在电机旋转时闭合会磨损。',
   ],
   'regen.title': ['Braking resistor', '制动电阻'],
   'regen.help': [
-    'Energy returned by braking, and whether the drive can absorb it. Friction is not counted and only reduces it.',
-    '计算制动回馈能量及驱动器能否吸收。按能量方程计算，摩擦只会使其更小。',
+    'Energy returned by braking, and whether the drive can absorb it. Friction is not counted; the actual energy is lower.',
+    '计算制动回馈能量及驱动器能否吸收。未计摩擦，实际能量更小。',
   ],
   'regen.model': ['Model', '型号'],
   'regen.otherModel': ['other, by hand', '其他（手动填写）'],
@@ -263,7 +263,7 @@ export const functions = {
   'regen.fall': ['Energy of a falling load, per cycle', '每循环下落能量'],
   'regen.capacitor': ['Absorbed by the DC bus', '母线电容吸收'],
   'regen.builtOhm': ['Built-in resistor', '内置电阻'],
-  'regen.builtPower': ['Its continuous power', '内置电阻持续功率'],
+  'regen.builtPower': ['Continuous power of the built-in resistor', '内置电阻持续功率'],
   'regen.minOhm': ['Minimum external resistance', '外接电阻最小值'],
   'regen.maxPower': ['Maximum external power', '外接电阻最大功率'],
   'regen.voltage': ['Threshold voltage', '制动阈值电压'],
@@ -313,7 +313,7 @@ export const functions = {
 
   'motion.tab.settings': ['Settings', '设置'],
   'group.stopping': ['Stopping', '停止方式'],
-  'group.modulo': ['Modulo and rotary axis', '循环（取模）旋转轴'],
+  'group.modulo': ['Rotary axis (modulo)', '循环（取模）旋转轴'],
   'group.impedance': ['Impedance control', '阻抗控制'],
   'group.inputs': ['Terminals', '端子'],
   'settings.none': [
@@ -323,10 +323,10 @@ export const functions = {
 
   'watch.title': ['Watch list', '监视列表'],
   'watch.add': ['Add a parameter', '添加参数'],
-  'watch.find': ['Name, number or key', '名称、编号或键'],
+  'watch.find': ['Name, number or key', '名称、编号或索引'],
   'watch.empty': [
     'Add parameters to see their values live. The list is kept on this station.',
-    '在此添加参数以实时查看数值。列表保存在此调试台。',
+    '在此添加参数以实时查看数值。列表保存在本站。',
   ],
   'watch.remove': ['Remove {name} from the list', '从列表移除 {name}'],
   'watch.age': ['{time} ago', '{time}前'],

@@ -22,22 +22,22 @@ export const handover = {
   'handover.format.dcf': ['CANopen: DCF and concise DCF', 'CANopen：DCF 与简洁 DCF'],
   'handover.format.csv': ['Table (CSV)', '表格（CSV）'],
   'handover.format.python': ['Python script', 'Python 脚本'],
-  'handover.rows': ['Values', '取值范围'],
-  'handover.rows.all': ['All of the set', '参数集的全部'],
+  'handover.rows': ['Values', '要移交的值'],
+  'handover.rows.all': ['All of the set', '参数集的全部值'],
   'handover.rows.tuned': [
     'What tuning changes: gains, filters, notches',
     '整定相关：增益、滤波器、陷波器',
   ],
   'handover.rows.not_default': ['What differs from the default', '与默认值不同的参数'],
   'handover.rows.chosen': ['Chosen keys', '指定参数'],
-  'handover.keys': ['Keys, separated by commas', '参数键，以逗号分隔'],
+  'handover.keys': ['Keys, separated by commas', '参数索引，以逗号分隔'],
   'handover.individual': ['Also values that belong to one motor', '包括仅属于某一电机的值'],
   'handover.file': ['Name of the file', '文件名'],
   'handover.fileBad': ['Letters, digits, space, dot, dash', '仅限字母、数字、空格、点、短横'],
   'handover.esi': ["The drives' ESI files", '驱动器的 ESI 文件'],
   'handover.esiHelp': [
-    'With it mailboxes, sync managers, clock and frames are complete. Without it a master cannot run the ENI.',
-    '提供后，邮箱、同步管理器、时钟和帧完整。若不提供，主站无法运行该 ENI。',
+    'With the ESI files the ENI contains mailboxes, sync managers, clock and frames. Without them a master cannot use the ENI.',
+    '提供 ESI 文件后，ENI 含邮箱、同步管理器、时钟和帧。若不提供，主站无法使用该 ENI。',
   ],
   'handover.segment': [
     'Drives of the list, in the order of the cable',
@@ -69,7 +69,7 @@ export const handover = {
   ],
   'handover.noConflict': [
     'The controller overwrites nothing of this set.',
-    '控制器不会覆盖此参数集的任何值。',
+    '控制器不会覆盖此参数集中的任何值。',
   ],
   'handover.restored': [
     'These values in the drive differ from this set; the controller writes those of the set: {keys}',
@@ -120,7 +120,10 @@ export const handover = {
   'handover.defect.size': ['Wrong size', '长度错误'],
   'handover.defect.range': ['Out of range', '超出范围'],
   'handover.defect.twice': ['Written twice: the last value counts', '重复写入：以最后的值为准'],
-  'handover.defect.order': ['Written after what depends on it', '写入顺序错误：晚于依赖它的参数'],
+  'handover.defect.order': [
+    'Written too late: after a parameter that depends on it',
+    '写入顺序错误：晚于依赖它的参数',
+  ],
   'handover.defect.state': [
     'Written in a transition outside start-up',
     '在非启动过程的状态转换中写入',

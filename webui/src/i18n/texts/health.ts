@@ -14,7 +14,7 @@ export const health = {
   ],
   'health.notIntact': [
     'The baseline was changed after it was signed: its checksum differs. Nothing is compared with it; sign a new one.',
-    '基线与签署时不同：校验和不一致。不与其比较；请签署新的基线。',
+    '基线在签署后被更改：校验和不一致。不与其比较；请签署新的基线。',
   ],
   'health.otherSettings': [
     '{count} rounds since the baseline were measured with other settings and are not compared.',
@@ -39,24 +39,30 @@ export const health = {
   'safety.notShown': ['not shown', '未能显示'],
   'health.unattended': ['Without a person: schedule and controller', '无人值守：计划与控制器'],
   'health.unattendedHelp': [
-    'The measurements of the baseline begin by themselves where somebody who may move the axis permits it. They begin only while the axis is free, has no power and stands; otherwise nothing moves, and the reason is kept here.',
-    '在有权移动该轴的人员许可后，基线的测量可自行开始。仅当轴空闲、无动力且静止时才开始；否则没有任何运动，原因保留在此处。',
+    'The measurements of the baseline can start by schedule or on request of a controller, once a person who may move the axis has permitted it. They start only while the axis is free, without power and at standstill. Otherwise nothing moves, and the reason is listed here.',
+    '经有权移动该轴的人员许可后，可按计划或应控制器请求自动进行基线的测量。仅当轴空闲、未得电且静止时才开始；否则没有任何运动，原因列在此处。',
   ],
-  'health.nobodyPermits': ['Nobody permits it for this axis.', '此轴未获许可。'],
-  'health.permits': ['{person} permits it until {until}.', '{person} 许可至 {until}。'],
+  'health.nobodyPermits': [
+    'Runs without a person are not permitted for this axis.',
+    '此轴未获准无人值守运行。',
+  ],
+  'health.permits': [
+    '{person} permits these runs until {until}.',
+    '{person} 准许这些运行，至 {until}。',
+  ],
   'health.onDays': ['Schedule: {days} at {at}.', '计划：{days} {at}。'],
   'health.byTrigger': [
-    'A controller may ask for it, once in {pause} min.',
-    '控制器可请求，每 {pause} min 一次。',
+    'A controller may request a run, at most once in {pause} min.',
+    '控制器可请求运行，最多每 {pause} min 一次。',
   ],
   'health.nextDue': ['Next run: {when}.', '下次运行：{when}。'],
-  'health.withdraw': ['Take the permission back', '撤回许可'],
+  'health.withdraw': ['Withdraw the permission', '撤回许可'],
   'health.attempts': ['Runs without a person', '无人值守的运行'],
   'health.cause.schedule': ['schedule', '计划'],
   'health.cause.trigger': ['controller', '控制器'],
   'health.outcome.running': ['runs', '运行中'],
   'health.outcome.done': ['done', '已完成'],
-  'health.outcome.not_made': ['not made, nothing moved', '未进行，没有任何运动'],
+  'health.outcome.not_made': ['not run, nothing moved', '未进行，没有任何运动'],
   'health.outcome.missed': [
     'missed: servodeck did not run or was busy at the time',
     '已错过：当时 servodeck 未运行或忙',
@@ -75,7 +81,7 @@ export const health = {
   'health.lasts': ['Permitted for (days)', '许可期限（天）'],
   'health.pause': ['Least time between two runs (min)', '两次运行的最短间隔 (min)'],
   'health.permittedBy': ['Permitted by', '许可人'],
-  'health.trigger': ['A controller may ask for a run', '控制器可请求运行'],
+  'health.trigger': ['A controller may request a run', '控制器可请求运行'],
   'health.warning': [
     'WARNING. The axis moves at these times without anybody pressing a button, within the limits of the baseline. Guards and their interlocks must keep everybody out of the danger zone.',
     '警告。在这些时间，无人按下按钮轴也会在基线限值内运动。防护装置及其联锁必须使所有人处于危险区域之外。',

@@ -17,7 +17,7 @@ export const imported = {
   'import.output': ['Output: motion', '输出：运动'],
   'import.inputUnit': ['Unit of the input', '输入单位'],
   'import.outputUnit': ['Unit of the output', '输出单位'],
-  'import.unit.1': ['as it is', '不换算'],
+  'import.unit.1': ['no conversion', '不换算'],
   'import.unit.rated': ['share of rated torque', '额定转矩的倍数'],
   'import.unit.percent': ['% of rated torque', '额定转矩的 %'],
   'import.unit.permille': ['‰ of rated torque', '额定转矩的 ‰'],
@@ -58,7 +58,7 @@ export const imported = {
   ],
   'import.band': [
     'The band shows the range of each line in another run of the same machine, with 0.7 to 2 times the excitation.',
-    '置信带表示同一机器以 0.7 至 2 倍幅度的另一激励再次测量时各谱线所在的范围。',
+    '置信带表示以 0.7 至 2 倍的激励再次测量同一机器时各谱线所在的范围。',
   ],
   'import.inertia': [
     'Inertia {value} ({low} … {high}) {unit}; viscous friction at this level {viscous} {viscousUnit}.',

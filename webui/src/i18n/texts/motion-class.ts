@@ -25,8 +25,8 @@ export const motionClass = {
   ],
   'motionClass.change': ['Change the class', '更改类别'],
   'motionClass.warning': [
-    'WARNING: with a wrong class, writing a parameter can move the axis. Choose a class by the manual of the drive, or by a test with the load removed. The change is recorded in the audit.',
-    '警告：类别错误时，写入参数可能使轴运动。请依据驱动器手册，或在脱开负载的试验后选择类别。更改将记入审计记录。',
+    'WARNING: with a wrong class, writing a parameter can move the axis. Choose a class by the manual of the drive, or by a test with the load removed. The change is recorded in the audit trail.',
+    '警告：类别错误时，写入参数可能使轴运动。请依据驱动器手册，或脱开负载试验后选择类别。更改将记入审计记录。',
   ],
   'motionClass.class': ['Class', '类别'],
   'motionClass.reason': ['Reason (page of the manual, test)', '依据（手册页码、试验）'],

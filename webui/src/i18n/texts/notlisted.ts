@@ -51,21 +51,21 @@ export const notListed = {
   'line.search': ['Search baud rate and parity', '搜索波特率和校验'],
   'line.help': [
     'Tries the usual settings at the stations given above (station 1 if none). Only reads are sent.',
-    '在上面给出的站号（未填则为 1）尝试常用设置，只发送读取。',
+    '在上面给出的站地址（未填则为 1）尝试常用设置，仅进行读取。',
   ],
-  'line.found': ['Answers with {url}', '应答设置：{url}'],
+  'line.found': ['It answers with {url}', '应答设置：{url}'],
   'line.use': ['Use it', '使用'],
   'line.none': [
-    'Nothing answered at any of these settings. Check power, wiring and the station number.',
-    '所有设置下均无应答。请检查电源、接线和站号。',
+    'Nothing answered at any of these settings. Check power, wiring and the station address.',
+    '所有设置下均无应答。请检查电源、接线和站地址。',
   ],
   'port.missing': [
     'Not connected over {kind}: {count} {count|parameter is|parameters are} available only there ({groups}).',
-    '未通过 {kind} 连接：有 {count} 个参数仅在该端口（{groups}）。',
+    '未通过 {kind} 连接：有 {count} 个参数只能通过该端口访问（{groups}）。',
   ],
   'port.missingNothing': ['It can be connected over {kind} too.', '也可以通过 {kind} 连接。'],
   'port.connect': ['Connect {kind} too', '同时连接 {kind}'],
   'port.url': ['Bus URL', '总线 URL'],
-  'port.station': ['Station', '站号'],
+  'port.station': ['Station', '站地址'],
   'port.accept': ['It is the same drive: connect anyway', '是同一台驱动器：仍然连接'],
 } satisfies Texts

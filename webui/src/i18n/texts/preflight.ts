@@ -4,15 +4,18 @@ import type { Texts } from '../types'
 export const preflight = {
   'preflight.title': ['Preflight of the computer', '计算机预检'],
   'preflight.help': [
-    'What hinders punctual EtherCAT on the computer that servodeck runs on, the one whose removal helps most first. The measurement reads one register of all slaves on the interface chosen above; nothing is written to a drive.',
+    'Lists what hinders punctual EtherCAT on the computer that runs servodeck, the most effective remedy first. The measurement reads one register of all slaves on the interface chosen above; nothing is written to a drive.',
     '列出运行 servodeck 的计算机上妨碍 EtherCAT 准时运行的因素，改善效果最大的排在最前。测量时只读取上方所选接口上所有从站的一个寄存器，不向驱动器写入任何内容。',
   ],
-  'preflight.look': ['Look', '查看'],
+  'preflight.look': ['Check', '检查'],
   'preflight.measure': ['Measure for 10 s', '测量 10 秒'],
-  'preflight.none': ['Nothing hinders it.', '没有妨碍因素。'],
+  'preflight.none': [
+    'Nothing was found that hinders punctual EtherCAT.',
+    '未发现妨碍 EtherCAT 准时运行的因素。',
+  ],
   'preflight.first': ['Would help most', '改善效果最大'],
   'preflight.effect.blocks': ['no frame gets through', '帧无法通过'],
-  'preflight.effect.interrupts': ['the bus can fail in the midst of work', '总线可能在工作中中断'],
+  'preflight.effect.interrupts': ['the bus can fail during operation', '总线可能在运行中中断'],
   'preflight.effect.delays': ['up to {delay} µs late', '最多延迟 {delay} µs'],
   'preflight.purpose': ['Purpose', '用途'],
   'preflight.verdict': ['Verdict', '结论'],
@@ -23,10 +26,13 @@ export const preflight = {
     '{cycles} 个周期中错过 {missed} 个；99.9 % 的延迟不超过 {late} µs，最大 {most} µs',
   ],
   'preflight.trip': [
-    'Frame there and back: {median} µs, at most {most} µs',
-    '帧往返：{median} µs，最多 {most} µs',
+    'Round trip of a frame: {median} µs, at most {most} µs',
+    '帧往返时间：{median} µs，最大 {most} µs',
   ],
-  'preflight.unanswered': ['No frame came back.', '没有帧返回。'],
+  'preflight.unanswered': [
+    'No frame came back. Check cable, interface and the supply of the drives.',
+    '没有帧返回。请检查电缆、接口和驱动器供电。',
+  ],
   'preflight.fifo': ['real-time scheduling granted', '已授予实时调度'],
   'preflight.noFifo': ['real-time scheduling not granted', '未授予实时调度'],
   'preflight.histogram': [

@@ -15,7 +15,7 @@ export const segment = {
     '在图中选择驱动器以查看端口、别名和状态。',
   ],
   'segment.cable.errors': ['errors', '有错误'],
-  'segment.cable.broken': ['no link', '无连接'],
+  'segment.cable.broken': ['no link', '无链路'],
   'segment.brokenBetween': [
     'No communication between station {before} and station {station}: cable cut, or the supply of station {station} is off. It is connected again automatically.',
     '站 {before} 与站 {station} 之间无通信：电缆断开，或站 {station} 断电。恢复后自动重新连接。',
@@ -27,10 +27,10 @@ export const segment = {
   'segment.clear': ['Clear error counters', '清除错误计数'],
   'segment.cycles': ['Cycles', '周期数'],
   'segment.overruns': ['Skipped cycles', '跳过的周期'],
-  'segment.wkc': ['Working counter, expected', '工作计数器/期望值'],
-  'segment.late50': ['Late, half of all', '延迟，中位数'],
-  'segment.late99': ['Late, 99 %', '延迟，99 %'],
-  'segment.lateMax': ['Latest', '最大延迟'],
+  'segment.wkc': ['Working counter / expected', '工作计数器/期望值'],
+  'segment.late50': ['Lateness, median', '延迟，中位数'],
+  'segment.late99': ['Lateness, 99 %', '延迟，99 %'],
+  'segment.lateMax': ['Lateness, largest', '最大延迟'],
   'segment.dcNow': ['Deviation from the reference clock', '与参考时钟偏差'],
   'segment.dcMax': ['Largest deviation', '最大偏差'],
   'segment.histogram': [
@@ -50,10 +50,10 @@ export const segment = {
   'segment.link': ['Link', '连接'],
   'segment.linkUp': ['connected', '已连接'],
   'segment.linkDown': ['open', '未连接'],
-  'segment.lostLinks': ['Link lost', '断开次数'],
+  'segment.lostLinks': ['Link losses', '断开次数'],
   'segment.rxErrors': ['RX errors', '接收错误'],
   'segment.invalidFrames': ['Damaged frames', '损坏帧'],
-  'segment.forwarded': ['Forwarded RX errors', '上游损坏'],
+  'segment.forwarded': ['Forwarded RX errors', '转发的接收错误'],
   'segment.writeAlias': ['Write alias', '写入别名'],
   'segment.aliasWarning': [
     'The alias is written to the drive’s EEPROM and takes effect after a power cycle. If a controller addresses drives by alias, change it there as well. Nothing may move on this bus meanwhile.',
@@ -69,7 +69,7 @@ export const segment = {
   'segment.eepromIdentity': ['Compare identity with the firmware', '与固件比较标识'],
   'segment.eepromUnknown': [
     'The file belongs to exactly this drive, although the drive reports no identity',
-    '文件确属该驱动器，尽管驱动器无法说明自己的标识',
+    '文件确属该驱动器，尽管驱动器未报告标识',
   ],
   'segment.eepromSame': ['The EEPROM is identical already', 'EEPROM 已与此相同'],
   'segment.eepromChanges': ['What would change', '将更改的内容'],
@@ -109,8 +109,8 @@ export const segment = {
   'segment.permitted': ['everything needed is granted', '所需权限齐全'],
   'segment.advised': ['More punctual cycles with: {names}', '以下权限可提高周期准时性：{names}'],
   'segment.eitherCommand': [
-    'In a terminal, once (the first), or to start servodeck this time (the second):',
-    '在终端执行：第一条为一次性授权，第二条为本次启动 servodeck：',
+    'Run one of these in a terminal. The first grants it once and for all; the second grants it for one start of servodeck:',
+    '在终端执行其中一条：第一条为永久授权，第二条仅授权本次启动 servodeck：',
   ],
   'segment.command': ['In a terminal:', '在终端执行：'],
   'segment.commandsWhy': [
@@ -123,7 +123,7 @@ export const segment = {
   ],
   'segment.endRecovery': ['Do not restore it', '不再恢复'],
   'segment.doctor': ['Why not in Operational?', '为何未进入 Operational？'],
-  'segment.doctorStation': ['Station {station}', '站点 {station}'],
+  'segment.doctorStation': ['Station {station}', '站 {station}'],
   'segment.doctorWell': ['is in Operational', '已处于 Operational'],
   'segment.doctorFact': [
     '{name}: {actual}, should be {expected}',
@@ -151,7 +151,7 @@ export const segment = {
   ],
   'segment.trialNoReason': ['the drive reports no reason', '驱动器未报告原因'],
   'segment.trialCycle': [
-    'Choose this multiple of the cycle where the exchange is started: it is not a setting of the profile.',
+    'Choose this multiple of the cycle time when you start the cyclic exchange: it is not a setting of the profile.',
     '请在启动周期通信时选择该倍数的周期：它不属于配置文件的设置。',
   ],
   'segment.trialKeep': ['Keep', '保留'],

@@ -4,7 +4,7 @@ import type { Texts } from '../types'
 export const unwatched = {
   'unwatched.why': [
     'WARNING: no watchdog of this drive ends a speed command when this computer stops sending. If the cable is pulled or this program ends during the measurement, the axis keeps its last speed until its travel limit or the emergency stop acts.',
-    '警告：本计算机失去联系时，驱动器不会自行结束速度指令：如果测量期间拔掉电缆或程序终止，轴会保持最后的速度，直到其自身行程限位或急停。',
+    '警告：本计算机停止发送时，该驱动器没有看门狗来结束速度指令。如果测量期间拔掉电缆或程序终止，轴会保持最后的速度，直到其行程限位或急停起作用。',
   ],
   'unwatched.consent': [
     'I agree for this one measurement. The drive’s travel limits are active and a hand is on the emergency stop.',
