@@ -126,7 +126,7 @@ class FeedbackWatch:
         self._newest.clear()
 
     def interrupt(self) -> None:
-        """Begin a new window: the position was set anew (homing), or samples are missing."""
+        """Begin a new window: the position was set again (homing), or samples are missing."""
         self._parts.clear()
         self._newest.clear()
         self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None

@@ -52,7 +52,7 @@ class SpeedGuard:
             self._watch.gap()
 
     def interrupt(self) -> None:
-        """Restart the comparison: the position was set anew, or samples are missing."""
+        """Restart the comparison: the position was set again, or samples are missing."""
         if self._watch is not None:
             self._watch.interrupt()
 

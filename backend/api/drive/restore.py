@@ -1,4 +1,4 @@
-"""Routes of the restore list: values that a motion borrowed and could not restore."""
+"""Routes of the restore list: values that a motion changed temporarily and could not restore."""
 
 from __future__ import annotations
 

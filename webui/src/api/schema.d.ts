@@ -13,13 +13,13 @@ export interface paths {
         };
         /**
          * Accounts
-         * @description Who may log in.
+         * @description List the accounts.
          */
         get: operations["accounts"];
         put?: never;
         /**
          * Add Account
-         * @description Make an account.
+         * @description Add an account.
          */
         post: operations["add_account"];
         delete?: never;
@@ -47,7 +47,7 @@ export interface paths {
         head?: never;
         /**
          * Change Account
-         * @description Change role or password; with the password all sessions of the account end.
+         * @description Change role or password; a new password ends all sessions of the account.
          */
         patch: operations["change_account"];
         trace?: never;
@@ -61,7 +61,7 @@ export interface paths {
         };
         /**
          * Search Audit
-         * @description Entries, newest first.
+         * @description List entries, newest first.
          */
         get: operations["search_audit"];
         put?: never;
@@ -81,7 +81,7 @@ export interface paths {
         };
         /**
          * Export Audit
-         * @description Entries as a table, or as JSON lines with hashes, oldest first.
+         * @description Export entries as a table, or as JSON lines with hashes, oldest first.
          */
         get: operations["export_audit"];
         put?: never;
@@ -101,7 +101,7 @@ export interface paths {
         };
         /**
          * Audit Names
-         * @description What can be chosen in a filter.
+         * @description List the values that can be chosen in a filter.
          */
         get: operations["audit_names"];
         put?: never;
@@ -161,12 +161,12 @@ export interface paths {
         };
         /**
          * Box
-         * @description The station's name, what its network ports are for, and what could be chosen.
+         * @description Read the station's name, the use of its network ports, and the possible choices.
          */
         get: operations["box"];
         /**
          * Set Box
-         * @description Name the station and say which port is EtherCAT's and which the office's.
+         * @description Set the station's name, and which ports are for EtherCAT and for the office network.
          */
         put: operations["set_box"];
         post?: never;
@@ -185,7 +185,7 @@ export interface paths {
         };
         /**
          * List Bundles
-         * @description Support bundles that faults or people made.
+         * @description List support bundles made by faults or people.
          */
         get: operations["list_bundles"];
         put?: never;
@@ -210,7 +210,7 @@ export interface paths {
         get?: never;
         /**
          * Arm Capture
-         * @description Say whether a fault freezes the last seconds.
+         * @description Set whether a fault makes a support bundle of the last seconds.
          */
         put: operations["arm_capture"];
         post?: never;
@@ -229,14 +229,14 @@ export interface paths {
         };
         /**
          * Download Bundle
-         * @description The zip.
+         * @description Download a support bundle (zip).
          */
         get: operations["download_bundle"];
         put?: never;
         post?: never;
         /**
          * Delete Bundle
-         * @description Delete a bundle.
+         * @description Delete a support bundle.
          */
         delete: operations["delete_bundle"];
         options?: never;
@@ -253,7 +253,7 @@ export interface paths {
         };
         /**
          * Buses
-         * @description Opened buses with their counters.
+         * @description List opened buses with their counters.
          */
         get: operations["buses"];
         put?: never;
@@ -279,12 +279,12 @@ export interface paths {
         put?: never;
         /**
          * Start Cyclic
-         * @description Exchange process data with all drives of a bus.
+         * @description Start to exchange process data with all drives of a bus.
          */
         post: operations["start_cyclic"];
         /**
          * Stop Cyclic
-         * @description End the cyclic exchange of a bus; what moves is braked.
+         * @description End the cyclic exchange of a bus; moving axes are braked.
          */
         delete: operations["stop_cyclic"];
         options?: never;
@@ -301,9 +301,10 @@ export interface paths {
         };
         /**
          * Bus Doctor
-         * @description What keeps the stations of an opened EtherCAT or CANopen bus from Operational.
+         * @description Find what keeps the stations of an opened EtherCAT or CANopen bus from Operational.
          *
-         *     The likeliest cause first. Reads registers and objects as they are now; changes no state.
+         *     The most likely cause comes first. Reads registers and objects as they
+         *     are now; changes no state.
          */
         get: operations["bus_doctor"];
         put?: never;
@@ -326,13 +327,13 @@ export interface paths {
          * Keep Setting
          * @description Use a setting that has just reached Operational, until the drive is connected again.
          *
-         *     It is stored nowhere: to keep it longer, write it into the profile.
+         *     It is not stored: to use it permanently, write it into the profile.
          */
         put: operations["keep_setting"];
         post?: never;
         /**
          * Undo Setting
-         * @description Use the profile again as it was before a setting of this station was kept.
+         * @description Undo a kept setting of this station: its profile applies again.
          */
         delete: operations["undo_setting"];
         options?: never;
@@ -353,8 +354,8 @@ export interface paths {
          * Try Setting
          * @description Take a drive to Operational with one setting changed, then undo it.
          *
-         *     Nothing is written to the drive's parameters and no axis is enabled. The job's result is
-         *     TrialResult.
+         *     Nothing is written to the drive's parameters and no axis is enabled. The
+         *     job's result is TrialResult.
          */
         post: operations["try_setting"];
         delete?: never;
@@ -372,7 +373,7 @@ export interface paths {
         };
         /**
          * Bus Flight
-         * @description The last 60 s of frames of an opened bus as a pcapng file, of one station or of all.
+         * @description Download the last 60 s of frames of an opened bus as pcapng, of one station or of all.
          *
          *     Wireshark reads it: EtherCAT as Ethernet, CAN as SocketCAN, serial lines as LINKTYPE_USER0.
          */
@@ -396,7 +397,7 @@ export interface paths {
         put?: never;
         /**
          * Calculate Braking
-         * @description Energy of a braked mass and the resistor that takes it.
+         * @description Calculate the energy of braking and the braking resistor that absorbs it.
          */
         post: operations["calculate_braking"];
         delete?: never;
@@ -414,7 +415,7 @@ export interface paths {
         };
         /**
          * Certificate
-         * @description The certificate of the station's authority, for a phone or computer that is to trust it.
+         * @description Download the certificate of the station's authority, for a device that is to trust it.
          */
         get: operations["certificate"];
         put?: never;
@@ -434,7 +435,7 @@ export interface paths {
         };
         /**
          * Chat
-         * @description The last lines of the chat.
+         * @description Read the last lines of the chat.
          */
         get: operations["chat"];
         put?: never;
@@ -476,7 +477,7 @@ export interface paths {
         put?: never;
         /**
          * Described Devices
-         * @description The devices of an ESI file, to choose from; empty for an EDS or DCF file, which has one.
+         * @description List the devices of an ESI file; empty for an EDS or DCF file, which has one device.
          */
         post: operations["described_devices"];
         delete?: never;
@@ -514,13 +515,13 @@ export interface paths {
         };
         /**
          * Drives
-         * @description Drives of the bench.
+         * @description List the drives of the bench.
          */
         get: operations["drives"];
         put?: never;
         /**
          * Connect
-         * @description Make a station a drive of the bench. Its identity is asked for first.
+         * @description Connect a station as a drive of the bench. Its identity is read first.
          */
         post: operations["connect"];
         delete?: never;
@@ -538,14 +539,14 @@ export interface paths {
         };
         /**
          * Drive
-         * @description One drive.
+         * @description Read one drive.
          */
         get: operations["drive"];
         put?: never;
         post?: never;
         /**
          * Remove Drive
-         * @description Take a drive off the bench.
+         * @description Remove a drive from the bench.
          */
         delete: operations["remove_drive"];
         options?: never;
@@ -588,7 +589,7 @@ export interface paths {
         };
         /**
          * Fault History
-         * @description The drive's own record, read now where that takes no write; else how it is kept.
+         * @description Read the drive's fault record, unless that takes a write; then only describe the record.
          */
         get: operations["fault_history"];
         put?: never;
@@ -610,7 +611,7 @@ export interface paths {
         put?: never;
         /**
          * Read Fault History
-         * @description The drive's own record, read now; a selector is written and restored where it takes one.
+         * @description Read the drive's fault record; a selector is written and restored where needed.
          */
         post: operations["read_fault_history"];
         delete?: never;
@@ -648,7 +649,7 @@ export interface paths {
         };
         /**
          * Faults
-         * @description Faults and warnings that are present, read now.
+         * @description Read the faults and warnings that are active now.
          */
         get: operations["faults"];
         put?: never;
@@ -668,7 +669,7 @@ export interface paths {
         };
         /**
          * Describe Functions
-         * @description What the pages need of this family beyond its parameters; nothing is read from the drive.
+         * @description Describe the functions of this family beyond its parameters; the drive is not read.
          */
         get: operations["describe_functions"];
         put?: never;
@@ -688,12 +689,12 @@ export interface paths {
         };
         /**
          * Read Gains
-         * @description Loop gains, read now.
+         * @description Read the loop gains.
          */
         get: operations["read_gains"];
         /**
          * Write Gains
-         * @description Write gains or a stiffness level and make them act; saving is another step.
+         * @description Write gains or a stiffness level and put them into effect; saving is a separate step.
          */
         put: operations["write_gains"];
         post?: never;
@@ -714,7 +715,7 @@ export interface paths {
         put?: never;
         /**
          * Plan Gear
-         * @description What the gear would be for these mechanics. Nothing is written.
+         * @description Calculate the gear for these mechanics. Nothing is written.
          */
         post: operations["plan_gear"];
         delete?: never;
@@ -734,7 +735,7 @@ export interface paths {
         put?: never;
         /**
          * Write Gear
-         * @description Write the gear for these mechanics, all or nothing, and keep the mechanics.
+         * @description Write the gear for these mechanics, all values or none, and store the mechanics.
          */
         post: operations["write_gear"];
         delete?: never;
@@ -754,7 +755,7 @@ export interface paths {
         put?: never;
         /**
          * Export Handover
-         * @description Make the files for the machine's controller and note it for the report.
+         * @description Make the files for the machine's controller and record the hand-over for the report.
          *
          *     Nothing is written to the drive.
          */
@@ -776,7 +777,7 @@ export interface paths {
         put?: never;
         /**
          * Compare Handover
-         * @description What the controller will write: drive now, our set and its list. Nothing is changed.
+         * @description Compare the drive now, our set and the controller's list. Nothing is changed.
          */
         post: operations["compare_handover"];
         delete?: never;
@@ -794,7 +795,7 @@ export interface paths {
         };
         /**
          * List Handovers
-         * @description Earlier hand-overs of a drive, newest first.
+         * @description List earlier hand-overs of a drive, newest first.
          */
         get: operations["list_handovers"];
         put?: never;
@@ -814,7 +815,7 @@ export interface paths {
         };
         /**
          * Changes Since
-         * @description What the drive holds other than it was handed over; it is read now.
+         * @description Read the drive and list the values that differ from those handed over.
          */
         get: operations["changes_since"];
         put?: never;
@@ -834,7 +835,7 @@ export interface paths {
         };
         /**
          * Read Health
-         * @description Baseline, comparison and rounds of one axis.
+         * @description Read baseline, comparison and rounds of one axis.
          */
         get: operations["read_health"];
         put?: never;
@@ -856,9 +857,9 @@ export interface paths {
         put?: never;
         /**
          * Sign Baseline
-         * @description Sign rounds as the baseline of the axis. The one before is kept, and counts no longer.
+         * @description Sign rounds as the baseline of the axis. The previous one is kept, but no longer used.
          *
-         *     Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+         *     A person who is logged in signs by that name; ``person`` is used on stations without accounts.
          */
         post: operations["sign_baseline"];
         delete?: never;
@@ -876,18 +877,18 @@ export interface paths {
         };
         /**
          * Read Health Permission
-         * @description Who permits runs without a person, when, and what became of them; null without any.
+         * @description Read the permission for unattended runs, with schedule and attempts; null without one.
          */
         get: operations["read_health_permission"];
         /**
          * Permit Health
-         * @description Permit runs of the baseline's measurements without a person. It replaces an older one.
+         * @description Permit unattended runs of the baseline's measurements. It replaces an earlier permission.
          */
         put: operations["permit_health"];
         post?: never;
         /**
          * Withdraw Health Permission
-         * @description End the permission, and a run that goes on by it.
+         * @description End the permission, and a run that it started.
          */
         delete: operations["withdraw_health_permission"];
         options?: never;
@@ -906,9 +907,9 @@ export interface paths {
         put?: never;
         /**
          * Trigger Health
-         * @description A controller asks for a run. Without a standing permission for it nothing moves.
+         * @description Start a run for a controller. Without a standing permission for it nothing moves.
          *
-         *     ``GET /jobs/{id}`` shows how far it is, ``GET /drives/{id}/health`` what has changed.
+         *     ``GET /jobs/{id}`` returns its progress, ``GET /drives/{id}/health`` what has changed.
          */
         post: operations["trigger_health"];
         delete?: never;
@@ -926,7 +927,7 @@ export interface paths {
         };
         /**
          * Homing Methods
-         * @description Homing methods of this family.
+         * @description List the homing methods of this family.
          */
         get: operations["homing_methods"];
         put?: never;
@@ -946,7 +947,7 @@ export interface paths {
         };
         /**
          * Terminals
-         * @description All terminals with state, function and polarity, read now.
+         * @description Read all terminals with state, function and polarity.
          */
         get: operations["terminals"];
         put?: never;
@@ -967,17 +968,17 @@ export interface paths {
         get?: never;
         /**
          * Overrule
-         * @description Overrule or release terminals; also the sign of life of the page.
+         * @description Force or release terminals; also renews the session of the page.
          */
         put: operations["overrule"];
         /**
          * Start Forcing
-         * @description Begin to overrule terminals; it ends when nobody renews it for five seconds.
+         * @description Begin to force terminals; the session ends if it is not renewed for five seconds.
          */
         post: operations["start_forcing"];
         /**
          * End Forcing
-         * @description Release everything; everybody may.
+         * @description Release all forced terminals; everybody may do this, without control of the axis.
          */
         delete: operations["end_forcing"];
         options?: never;
@@ -1096,7 +1097,7 @@ export interface paths {
         put?: never;
         /**
          * Load Firmware
-         * @description Send firmware by FoE to a drive whose profile says that it takes it so.
+         * @description Send firmware by FoE to a drive whose profile states that it accepts it.
          *
          *     The job cannot be cancelled: a download that breaks off may leave the drive without firmware.
          */
@@ -1178,7 +1179,7 @@ export interface paths {
         put?: never;
         /**
          * Start Generator
-         * @description Play a test signal in a cyclic mode, one value per cycle.
+         * @description Output a test signal in a cyclic mode, one value per cycle.
          */
         post: operations["start_generator"];
         delete?: never;
@@ -1238,7 +1239,7 @@ export interface paths {
         put?: never;
         /**
          * Start Identification
-         * @description Let the drive identify motor and load by itself; the motor moves.
+         * @description Start the drive's own identification of motor and load; the motor moves.
          */
         post: operations["start_identification"];
         delete?: never;
@@ -1318,7 +1319,7 @@ export interface paths {
         put?: never;
         /**
          * Start Move
-         * @description One move in a profile mode.
+         * @description Start one move in a profile mode.
          */
         post: operations["start_move"];
         delete?: never;
@@ -1340,8 +1341,8 @@ export interface paths {
          * Put Back
          * @description Restore every pending value of the drive, while its axis is at standstill.
          *
-         *     Where one of them can put energy into the motor (a mode, the function of a terminal), the right
-         *     to move is needed, too.
+         *     If one of them can energise the motor (a mode, the function of a terminal), the right
+         *     to move is also required.
          */
         post: operations["put_back"];
         delete?: never;
@@ -1361,7 +1362,7 @@ export interface paths {
         put?: never;
         /**
          * Read All
-         * @description Read parameters; values go out over the websocket as they arrive.
+         * @description Read parameters; the values are sent over the websocket as they arrive.
          */
         post: operations["read_all"];
         delete?: never;
@@ -1401,7 +1402,7 @@ export interface paths {
         put?: never;
         /**
          * Start Sequence
-         * @description Back and forth between two positions.
+         * @description Start a reciprocating move between two positions.
          */
         post: operations["start_sequence"];
         delete?: never;
@@ -1441,7 +1442,7 @@ export interface paths {
         put?: never;
         /**
          * Start Small Move
-         * @description Move by some increments, slowly and with little torque, to see how far the shaft turns.
+         * @description Move by some increments, slowly and with low torque, to observe how far the shaft turns.
          */
         post: operations["start_small_move"];
         delete?: never;
@@ -1519,7 +1520,7 @@ export interface paths {
         };
         /**
          * Drive Log
-         * @description The log of one drive, newest first.
+         * @description Read the log of one drive, newest first.
          */
         get: operations["drive_log"];
         put?: never;
@@ -1540,7 +1541,7 @@ export interface paths {
         get?: never;
         /**
          * Keep Mechanics
-         * @description Keep the mechanics, so that pages show travel. Nothing is written to the drive.
+         * @description Store the mechanics, so that pages show travel. Nothing is written to the drive.
          */
         put: operations["keep_mechanics"];
         post?: never;
@@ -1559,7 +1560,7 @@ export interface paths {
         };
         /**
          * Drive Missing Ports
-         * @description Ports over which a drive could be reached as well, and what only they reach.
+         * @description List additional ports over which a drive could be reached, and what only they reach.
          */
         get: operations["drive_missing_ports"];
         put?: never;
@@ -1582,9 +1583,9 @@ export interface paths {
          * Write Motion Setting
          * @description Write a setting that can start a motion at once; only while the motor has no power.
          *
-         *     Functions of terminals, control sources and the mapping of process data. The shaft is watched:
-         *     where it begins to turn, the setting is restored and the axis is stopped. The grant is for this
-         *     one write and ends with it; ``reason`` is in log and audit.
+         *     These are functions of terminals, control sources and the mapping of process data. The shaft is
+         *     watched: if it begins to turn, the setting is restored and the axis is stopped. The grant is for
+         *     this one write and ends with it; ``reason`` is in log and audit.
          */
         put: operations["write_motion_setting"];
         post?: never;
@@ -1603,12 +1604,12 @@ export interface paths {
         };
         /**
          * Read Notches
-         * @description All notches of the drive, read now.
+         * @description Read all notches of the drive.
          */
         get: operations["read_notches"];
         /**
          * Write Notches
-         * @description Write all notches and make them act; saving is another step.
+         * @description Write all notches and put them into effect; saving in the drive is a separate step.
          */
         put: operations["write_notches"];
         post?: never;
@@ -1629,7 +1630,7 @@ export interface paths {
         put?: never;
         /**
          * Preview Notches
-         * @description What the drive would make of these notches. Nothing is read or written.
+         * @description Preview how the drive would realise these notches. Nothing is read or written.
          */
         post: operations["preview_notches"];
         delete?: never;
@@ -1647,12 +1648,12 @@ export interface paths {
         };
         /**
          * List Parameters
-         * @description All parameters with their last readings; nothing is read from the drive.
+         * @description List all parameters with their last readings; nothing is read from the drive.
          */
         get: operations["list_parameters"];
         /**
          * Write Parameters
-         * @description Write several, one after the other; a failure does not stop the rest.
+         * @description Write several parameters, one after the other; a failure does not stop the rest.
          */
         put: operations["write_parameters"];
         post?: never;
@@ -1698,7 +1699,7 @@ export interface paths {
         post?: never;
         /**
          * Keep As It Is
-         * @description The values shall stay as they are now; nothing is written.
+         * @description Leave the values as they are and clear the restore list; nothing is written.
          */
         delete: operations["keep_as_it_is"];
         options?: never;
@@ -1717,9 +1718,9 @@ export interface paths {
         put?: never;
         /**
          * Add Port
-         * @description Connect a drive over a second bus; each parameter then goes the way that carries it.
+         * @description Connect a drive over a second bus; each parameter then uses the bus that carries it.
          *
-         *     Refused where settings read there differ from the drive's, unless that is accepted.
+         *     Refused if settings read there differ from the drive's, unless that is accepted.
          */
         post: operations["add_port"];
         delete?: never;
@@ -1737,7 +1738,7 @@ export interface paths {
         };
         /**
          * List Procedures
-         * @description Named sequences of this family.
+         * @description List the procedures of this family.
          */
         get: operations["list_procedures"];
         put?: never;
@@ -1759,7 +1760,7 @@ export interface paths {
         put?: never;
         /**
          * Run Procedure
-         * @description Carry out a procedure.
+         * @description Run a procedure.
          */
         post: operations["run_procedure"];
         delete?: never;
@@ -1777,7 +1778,7 @@ export interface paths {
         };
         /**
          * Axis Record
-         * @description Mechanics and watch list of an axis, and what its drive bounds motions to.
+         * @description Read mechanics and watch list of an axis, and the gentlest ramp that its drive accepts.
          */
         get: operations["axis_record"];
         put?: never;
@@ -1817,18 +1818,18 @@ export interface paths {
         };
         /**
          * Read Scales
-         * @description The scales, read from the drive now.
+         * @description Read the scales from the drive now.
          */
         get: operations["read_scales"];
         /**
          * State Scales
-         * @description Scales from a data sheet, stated by a person. Nothing is written to the drive.
+         * @description Store scales from a data sheet, as stated by a person. Nothing is written to the drive.
          */
         put: operations["state_scales"];
         post?: never;
         /**
          * Forget Taught
-         * @description Forget what a person has said; the drive, its file and its manual count again.
+         * @description Delete scales stated by a person; those of the drive, its file and its manual apply again.
          */
         delete: operations["forget_taught"];
         options?: never;
@@ -1847,7 +1848,9 @@ export interface paths {
         put?: never;
         /**
          * Confirm Scales
-         * @description How far the shaft turned in the last small move: the resolution, and the unit of 606Ch.
+         * @description State how far the shaft turned in the last small move.
+         *
+         *     The resolution and the unit of 606Ch follow from it.
          */
         post: operations["confirm_scales"];
         delete?: never;
@@ -1885,7 +1888,7 @@ export interface paths {
         };
         /**
          * State
-         * @description State of the axis, read now.
+         * @description Read the state of the axis now.
          */
         get: operations["state"];
         put?: never;
@@ -1905,7 +1908,7 @@ export interface paths {
         };
         /**
          * Three Way
-         * @description What changed since a common base, in another set and in the drive, which is read now.
+         * @description List what has changed since a common base, in another set and in the drive (read now).
          */
         get: operations["three_way"];
         put?: never;
@@ -1947,7 +1950,7 @@ export interface paths {
         put?: never;
         /**
          * Transition
-         * @description Drive the power state machine. Enabling aims the setpoint at where the axis is.
+         * @description Drive the power state machine. Enabling sets the setpoint to the actual position first.
          */
         post: operations["transition"];
         delete?: never;
@@ -1967,7 +1970,7 @@ export interface paths {
         put?: never;
         /**
          * Candidates
-         * @description Notch sets and gains for a stored response. Nothing is written.
+         * @description List notch sets and gains for a stored response. Nothing is written.
          */
         post: operations["candidates"];
         delete?: never;
@@ -1987,7 +1990,7 @@ export interface paths {
         put?: never;
         /**
          * Preview Excitation
-         * @description What a frequency response would play. Nothing moves.
+         * @description Preview the excitation of a frequency response. Nothing moves.
          */
         post: operations["preview_excitation"];
         delete?: never;
@@ -2007,7 +2010,7 @@ export interface paths {
         put?: never;
         /**
          * Predict
-         * @description The speed loop that notches and gains would make of a stored response.
+         * @description Predict the speed loop of a stored response with these notches and gains.
          */
         post: operations["predict"];
         delete?: never;
@@ -2027,9 +2030,9 @@ export interface paths {
         put?: never;
         /**
          * Undo Tuning
-         * @description Put back what a change returned as `before`; returns what was there until now.
+         * @description Restore the values that a change returned as `before`; returns the undo of that.
          *
-         *     With the change's `after` nothing is restored over what somebody else has written since.
+         *     If the change's `after` is given, a value that was written since is not overwritten.
          */
         post: operations["undo_tuning"];
         delete?: never;
@@ -2048,7 +2051,7 @@ export interface paths {
         get?: never;
         /**
          * Keep Watch
-         * @description Keep the watch list.
+         * @description Store the watch list.
          *
          *     Raises:
          *         NotFound: a key is not a parameter of this drive.
@@ -2072,7 +2075,7 @@ export interface paths {
         put?: never;
         /**
          * Write Alias
-         * @description Write a station alias; the EEPROM takes its time, so nothing may move on this bus.
+         * @description Write a station alias; the EEPROM takes time, so nothing may move on this bus.
          */
         post: operations["write_alias"];
         delete?: never;
@@ -2092,7 +2095,7 @@ export interface paths {
         put?: never;
         /**
          * Clear Counters
-         * @description Set the port error counters of one station or of all to zero.
+         * @description Clear the port error counters of one station or of all.
          */
         post: operations["clear_counters"];
         delete?: never;
@@ -2110,7 +2113,7 @@ export interface paths {
         };
         /**
          * Read Eeprom
-         * @description The contents of the EEPROM as a file. Not while the cyclic exchange runs.
+         * @description Read the EEPROM and download it as a file. Refused while the cyclic exchange runs.
          */
         get: operations["read_eeprom"];
         put?: never;
@@ -2132,7 +2135,7 @@ export interface paths {
         put?: never;
         /**
          * Compare Eeprom
-         * @description The EEPROM against a saved file, or against what the maker's file says. Writes nothing.
+         * @description Compare the EEPROM with a saved file, or with the maker's file. Writes nothing.
          */
         post: operations["compare_eeprom"];
         delete?: never;
@@ -2152,7 +2155,7 @@ export interface paths {
         put?: never;
         /**
          * Plan Eeprom
-         * @description What a change would write, with the digest that confirms it. Writes nothing.
+         * @description Plan a change: what it would write, with the digest that confirms it. Writes nothing.
          */
         post: operations["plan_eeprom"];
         delete?: never;
@@ -2172,10 +2175,10 @@ export interface paths {
         put?: never;
         /**
          * Restore Eeprom
-         * @description Write what was planned, read everything back, and say what was written.
+         * @description Write what was planned, read everything back, and return what was written.
          *
-         *     Refused while somebody moves an axis of the segment or has control of one. Who asked may leave
-         *     meanwhile: it goes on to its end.
+         *     Refused while an axis of the segment moves or another person has control of one. The writing
+         *     continues to its end even if the client disconnects.
          */
         post: operations["restore_eeprom"];
         delete?: never;
@@ -2193,7 +2196,7 @@ export interface paths {
         };
         /**
          * Ethercat Permissions
-         * @description What is missing to use an interface that need not be opened yet.
+         * @description List the permissions that are missing to use an interface; it need not be open.
          */
         get: operations["ethercat_permissions"];
         put?: never;
@@ -2213,9 +2216,9 @@ export interface paths {
         };
         /**
          * Ethercat Segment
-         * @description An opened segment: its stations in the order of the cable, ports, clocks, punctuality.
+         * @description Survey an opened segment: stations in the order of the cable, ports, clocks, cycle timing.
          *
-         *     Answers as well while the segment cannot be asked; ``problem`` then states the reason.
+         *     It also answers while the stations cannot be read; ``problem`` then states the reason.
          */
         get: operations["ethercat_segment"];
         put?: never;
@@ -2237,7 +2240,7 @@ export interface paths {
         put?: never;
         /**
          * Join
-         * @description Come in as a guest, by the link and the code of an invitation.
+         * @description Join as a guest, by the link and the code of an invitation.
          */
         post: operations["join"];
         delete?: never;
@@ -2257,7 +2260,7 @@ export interface paths {
         put?: never;
         /**
          * Export Segment
-         * @description The same for several drives of one bus, in the order of the cable.
+         * @description Make one list for several drives of one bus, in the order of the cable.
          */
         post: operations["export_segment"];
         delete?: never;
@@ -2295,7 +2298,7 @@ export interface paths {
         };
         /**
          * Health Trend
-         * @description Every axis of the database with its rounds and its comparison, of all stations of it.
+         * @description Read every axis of the database, of all its stations, with rounds and comparison.
          */
         get: operations["health_trend"];
         put?: never;
@@ -2315,7 +2318,7 @@ export interface paths {
         };
         /**
          * Interfaces
-         * @description What this machine can connect through.
+         * @description List the interfaces of this machine through which drives can be connected.
          */
         get: operations["interfaces"];
         put?: never;
@@ -2335,13 +2338,13 @@ export interface paths {
         };
         /**
          * Invitations
-         * @description Invitations since the server was started, newest first.
+         * @description List invitations since the server was started, newest first.
          */
         get: operations["invitations"];
         put?: never;
         /**
          * Invite
-         * @description Invite a guest. The link and the code go to them by different ways.
+         * @description Invite a guest. Link and code are to be sent by different ways.
          */
         post: operations["invite"];
         delete?: never;
@@ -2362,7 +2365,7 @@ export interface paths {
         post?: never;
         /**
          * Revoke Invitation
-         * @description End an invitation; its guest is out at once and what they move stops.
+         * @description End an invitation: the guest's session ends at once and what they move stops.
          */
         delete: operations["revoke_invitation"];
         options?: never;
@@ -2380,7 +2383,7 @@ export interface paths {
         get?: never;
         /**
          * Grant
-         * @description Let a guest do more for some minutes. One cannot give what one does not have.
+         * @description Grant a guest rights for some minutes. Nobody can grant a right that they do not have.
          */
         put: operations["grant"];
         post?: never;
@@ -2403,7 +2406,7 @@ export interface paths {
         };
         /**
          * Jobs
-         * @description Jobs of this session, oldest first.
+         * @description List the jobs of this session, oldest first.
          */
         get: operations["jobs"];
         put?: never;
@@ -2423,14 +2426,14 @@ export interface paths {
         };
         /**
          * Job
-         * @description One job.
+         * @description Read one job.
          */
         get: operations["job"];
         put?: never;
         post?: never;
         /**
          * Cancel Job
-         * @description Cancel a job and wait for its cleanup. A motion everybody may end, as with STOP.
+         * @description Cancel a job and wait for its cleanup. Everybody may cancel a motion, as with STOP.
          */
         delete: operations["cancel_job"];
         options?: never;
@@ -2447,7 +2450,7 @@ export interface paths {
         };
         /**
          * Search Library
-         * @description Entries, newest first.
+         * @description List entries, newest first.
          */
         get: operations["search_library"];
         put?: never;
@@ -2467,7 +2470,7 @@ export interface paths {
         };
         /**
          * Library Tags
-         * @description Tags in use.
+         * @description List tags in use, with counts.
          */
         get: operations["library_tags"];
         put?: never;
@@ -2487,21 +2490,21 @@ export interface paths {
         };
         /**
          * Library Entry
-         * @description One entry, also one that was archived.
+         * @description Read one entry, also one that was archived.
          */
         get: operations["library_entry"];
         put?: never;
         post?: never;
         /**
          * Delete Library Entry
-         * @description Put a parameter set or a shared entry aside; delete a file of this station for good.
+         * @description Archive a parameter set or a shared entry; delete a file of this station permanently.
          */
         delete: operations["delete_library_entry"];
         options?: never;
         head?: never;
         /**
          * Change Library Entry
-         * @description Change notes or tags, or take back what was archived.
+         * @description Change notes or tags, or restore an archived entry.
          */
         patch: operations["change_library_entry"];
         trace?: never;
@@ -2515,7 +2518,7 @@ export interface paths {
         };
         /**
          * Library Content
-         * @description Contents of a version as a download, the latest by default.
+         * @description Download the contents of a version, by default the latest.
          */
         get: operations["library_content"];
         put?: never;
@@ -2537,7 +2540,7 @@ export interface paths {
         put?: never;
         /**
          * Fetch Library Entry
-         * @description Copy shared contents into this station's folder, where they are opened like its own.
+         * @description Copy shared contents into this station's folder, where they can be opened like its own.
          */
         post: operations["fetch_library_entry"];
         delete?: never;
@@ -2575,7 +2578,7 @@ export interface paths {
         };
         /**
          * Library Versions
-         * @description All versions of an entry, newest first.
+         * @description List all versions of an entry, newest first.
          */
         get: operations["library_versions"];
         put?: never;
@@ -2595,7 +2598,7 @@ export interface paths {
         };
         /**
          * Log
-         * @description The tool's log, newest first.
+         * @description Read the station's log, newest first.
          */
         get: operations["log"];
         put?: never;
@@ -2615,13 +2618,13 @@ export interface paths {
         };
         /**
          * List Measurements
-         * @description Stored measurements, newest first; unusable ones say why.
+         * @description List stored measurements, newest first; unusable ones with their problem.
          */
         get: operations["list_measurements"];
         put?: never;
         /**
          * Upload Measurement
-         * @description Take a file of another computer; the body is the file.
+         * @description Store a file from another computer; the body is the file.
          */
         post: operations["upload_measurement"];
         delete?: never;
@@ -2661,7 +2664,7 @@ export interface paths {
         put?: never;
         /**
          * Preview Recording
-         * @description Columns of a recording of another program; the body is the file. Nothing is stored.
+         * @description Preview the columns of another program's recording (the body). Nothing is stored.
          */
         post: operations["preview_recording"];
         delete?: never;
@@ -2679,14 +2682,14 @@ export interface paths {
         };
         /**
          * Read Measurement
-         * @description One measurement, evaluated again from its raw data and compared with its first result.
+         * @description Read a measurement, evaluated again from its raw data and compared with its first result.
          */
         get: operations["read_measurement"];
         put?: never;
         post?: never;
         /**
          * Delete Measurement
-         * @description Delete a file, also one that is damaged.
+         * @description Delete a file, even if it is damaged.
          */
         delete: operations["delete_measurement"];
         options?: never;
@@ -2703,7 +2706,7 @@ export interface paths {
         };
         /**
          * Download Measurement
-         * @description The file itself, raw signals included, also when it is damaged.
+         * @description Download the file with its raw signals, even if it is damaged.
          */
         get: operations["download_measurement"];
         put?: never;
@@ -2725,9 +2728,9 @@ export interface paths {
         put?: never;
         /**
          * Sign Measurement
-         * @description Sign the record of a safety function, once. It certifies nothing.
+         * @description Sign the record of a safety function; possible once. The signature certifies nothing.
          *
-         *     Who is logged in signs by that name; ``person`` counts where the page is used without accounts.
+         *     A person who is logged in signs by that name; ``person`` is used on stations without accounts.
          */
         post: operations["sign_measurement"];
         delete?: never;
@@ -2745,7 +2748,7 @@ export interface paths {
         };
         /**
          * People Here
-         * @description Who is connected.
+         * @description List the people who are connected.
          */
         get: operations["people_here"];
         put?: never;
@@ -2765,13 +2768,13 @@ export interface paths {
         };
         /**
          * Look
-         * @description The computer as it is now; verdicts rest on the last measurement of this interface.
+         * @description Examine the computer now; verdicts rest on the last measurement of this interface.
          */
         get: operations["look"];
         put?: never;
         /**
          * Start Preflight
-         * @description Measure wake-ups, and with an interface frames, at 1 and 4 kHz; the result is kept.
+         * @description Measure wake-ups, with an interface also frames, at 1 and 4 kHz; stores the result.
          */
         post: operations["start_preflight"];
         delete?: never;
@@ -2791,7 +2794,7 @@ export interface paths {
         put?: never;
         /**
          * Apply Fix
-         * @description Change settings of the computer; what was there is kept on the disk and can be restored.
+         * @description Change settings of the computer; the old values are stored and can be restored.
          */
         post: operations["apply_fix"];
         /**
@@ -2813,7 +2816,7 @@ export interface paths {
         };
         /**
          * Profiles
-         * @description Profiles that servodeck brings, and the user's own; broken ones say why.
+         * @description List the profiles of servodeck and the user's own; broken ones with their problem.
          */
         get: operations["profiles"];
         put?: never;
@@ -2833,7 +2836,9 @@ export interface paths {
         };
         /**
          * Profile Matches
-         * @description Profiles that fit an identity, best first; for what a scan found before an import.
+         * @description List the profiles that match an identity, best first.
+         *
+         *     For drives that a scan found before their profile was imported.
          */
         get: operations["profile_matches"];
         put?: never;
@@ -2853,7 +2858,7 @@ export interface paths {
         };
         /**
          * Export Profile
-         * @description A profile's objects as a CANopen EDS file.
+         * @description Export a profile's objects as a CANopen EDS file.
          */
         get: operations["export_profile"];
         put?: never;
@@ -2873,7 +2878,7 @@ export interface paths {
         };
         /**
          * Export Slave Information
-         * @description A profile's identity, objects, PDOs and bring-up as an EtherCAT ESI file (ETG.2000).
+         * @description Export a profile's identity, objects, PDOs and bring-up as an ESI file (ETG.2000).
          */
         get: operations["export_slave_information"];
         put?: never;
@@ -2893,20 +2898,20 @@ export interface paths {
         };
         /**
          * Motion Class
-         * @description Whether writing an object can cause motion, who says so and why.
+         * @description Read whether writing an object can cause motion, with origin and reason of that class.
          */
         get: operations["motion_class"];
         /**
          * Set Motion Class
-         * @description Say what writing an object of an imported profile does, on one's own responsibility.
+         * @description Set the motion class of an object of an imported profile, on one's own responsibility.
          *
-         *     Another class than ``energises`` takes the right to move as well.
+         *     A class other than ``energises`` also requires the right to move.
          */
         put: operations["set_motion_class"];
         post?: never;
         /**
          * Forget Motion Class
-         * @description Take a class back that a person gave: the object counts as energising again.
+         * @description Remove a class that a person set: the object counts as energising again.
          */
         delete: operations["forget_motion_class"];
         options?: never;
@@ -2923,7 +2928,7 @@ export interface paths {
         };
         /**
          * Profile Texts
-         * @description The texts of a profile in another language, by their English original.
+         * @description Read the texts of a profile in another language, by their English original.
          */
         get: operations["profile_texts"];
         put?: never;
@@ -2943,13 +2948,13 @@ export interface paths {
         };
         /**
          * List Recordings
-         * @description Running and stored recordings that contain every word of ``search``.
+         * @description List running and stored recordings that contain every word of ``search``.
          */
         get: operations["list_recordings"];
         put?: never;
         /**
          * Start Recording
-         * @description Begin a recording, or begin to wait for its trigger.
+         * @description Start a recording, or start to wait for its trigger.
          */
         post: operations["start_recording"];
         delete?: never;
@@ -2968,7 +2973,7 @@ export interface paths {
         get?: never;
         /**
          * Set Retention
-         * @description Set when the oldest recordings are deleted.
+         * @description Set the limits above which the oldest recordings are deleted.
          */
         put: operations["set_retention"];
         post?: never;
@@ -2987,7 +2992,7 @@ export interface paths {
         };
         /**
          * Get Recording
-         * @description A recording with its events and the settings of its axes when it began.
+         * @description Read a recording with its events and the parameter values of its axes at the start.
          */
         get: operations["get_recording"];
         put?: never;
@@ -3001,7 +3006,7 @@ export interface paths {
         head?: never;
         /**
          * Change Recording
-         * @description Write notes or tags on a stored recording, or protect it from retention.
+         * @description Change notes or tags of a stored recording, or protect it from retention.
          */
         patch: operations["change_recording"];
         trace?: never;
@@ -3015,13 +3020,13 @@ export interface paths {
         };
         /**
          * Download Export
-         * @description A finished export.
+         * @description Download a finished export.
          */
         get: operations["download_export"];
         put?: never;
         /**
          * Export Recording
-         * @description Write a recording in another format, in a process of its own.
+         * @description Export a recording to another format, in a separate process.
          */
         post: operations["export_recording"];
         delete?: never;
@@ -3039,7 +3044,7 @@ export interface paths {
         };
         /**
          * Download Recording
-         * @description The recording's own file.
+         * @description Download the recording file.
          */
         get: operations["download_recording"];
         put?: never;
@@ -3059,7 +3064,7 @@ export interface paths {
         };
         /**
          * Get Samples
-         * @description A stretch of a stored recording as numbers, for programs; whole ones are exported.
+         * @description Read a section of a stored recording as numbers; to get all of it, export it.
          */
         get: operations["get_samples"];
         put?: never;
@@ -3081,7 +3086,7 @@ export interface paths {
         put?: never;
         /**
          * Stop Recording
-         * @description End a recording; null where its trigger had not come, so that nothing was kept.
+         * @description End a recording; null if its trigger had not occurred, so that nothing was stored.
          */
         post: operations["stop_recording"];
         delete?: never;
@@ -3101,7 +3106,7 @@ export interface paths {
         put?: never;
         /**
          * Trigger Recording
-         * @description Begin a waiting recording although its trigger did not come.
+         * @description Start a waiting recording although its trigger has not occurred.
          */
         post: operations["trigger_recording"];
         delete?: never;
@@ -3119,7 +3124,7 @@ export interface paths {
         };
         /**
          * List Reports
-         * @description Stored reports, newest first.
+         * @description List stored reports, newest first.
          */
         get: operations["list_reports"];
         put?: never;
@@ -3139,14 +3144,14 @@ export interface paths {
         };
         /**
          * Read Report
-         * @description The file, to be shown in the browser.
+         * @description Read a report, for display in the browser.
          */
         get: operations["read_report"];
         put?: never;
         post?: never;
         /**
          * Delete Report
-         * @description Delete a file.
+         * @description Delete a report.
          */
         delete: operations["delete_report"];
         options?: never;
@@ -3165,7 +3170,7 @@ export interface paths {
         put?: never;
         /**
          * Scan
-         * @description Look for drives; the job's result is ``{"found": [FoundDrive]}``.
+         * @description Search a bus for drives; the job's result is ``{"found": [FoundDrive]}``.
          */
         post: operations["scan"];
         delete?: never;
@@ -3183,7 +3188,7 @@ export interface paths {
         };
         /**
          * List Scope Setups
-         * @description Named set-ups; those that an older or newer version wrote differently are left out.
+         * @description List named set-ups; those in the format of another version are left out.
          */
         get: operations["list_scope_setups"];
         put?: never;
@@ -3204,13 +3209,13 @@ export interface paths {
         get?: never;
         /**
          * Save Scope Setup
-         * @description Keep a set-up under a name, in place of an earlier one of that name.
+         * @description Store a set-up under a name, replacing an earlier one of that name.
          */
         put: operations["save_scope_setup"];
         post?: never;
         /**
          * Delete Scope Setup
-         * @description Forget a set-up.
+         * @description Delete a set-up.
          */
         delete: operations["delete_scope_setup"];
         options?: never;
@@ -3227,7 +3232,7 @@ export interface paths {
         };
         /**
          * List Scope Snapshots
-         * @description Snapshots, newest first.
+         * @description List snapshots, newest first.
          */
         get: operations["list_scope_snapshots"];
         put?: never;
@@ -3247,7 +3252,7 @@ export interface paths {
         };
         /**
          * Read Scope Snapshot
-         * @description A snapshot's file.
+         * @description Download a snapshot file.
          */
         get: operations["read_scope_snapshot"];
         put?: never;
@@ -3295,13 +3300,13 @@ export interface paths {
         };
         /**
          * Session
-         * @description Who is asking. On a station without accounts the one user is administrator.
+         * @description Read the current session. On a station without accounts its person is administrator.
          */
         get: operations["session"];
         put?: never;
         /**
          * Log In
-         * @description Log in. Wrong tries are answered later and later.
+         * @description Log in. Each wrong try lengthens the wait.
          */
         post: operations["log_in"];
         /**
@@ -3324,7 +3329,7 @@ export interface paths {
         get?: never;
         /**
          * Change Password
-         * @description Change the own password; other sessions of the account end.
+         * @description Change one's own password; other sessions of the account end.
          */
         put: operations["change_password"];
         post?: never;
@@ -3343,7 +3348,7 @@ export interface paths {
         };
         /**
          * Sessions
-         * @description Log-ins that are valid: the own ones; for an administrator all.
+         * @description List valid log-in sessions: one's own; for an administrator all.
          */
         get: operations["sessions"];
         put?: never;
@@ -3366,7 +3371,7 @@ export interface paths {
         post?: never;
         /**
          * End Session
-         * @description End a log-in at once: an own one, or as an administrator anybody's.
+         * @description End a log-in session at once: one's own, or as an administrator anybody's.
          */
         delete: operations["end_session"];
         options?: never;
@@ -3383,7 +3388,7 @@ export interface paths {
         };
         /**
          * List Sets
-         * @description Stored parameter sets, newest first; at the end unusable files, which say why.
+         * @description List stored parameter sets, newest first; unusable files come last, with their problem.
          */
         get: operations["list_sets"];
         put?: never;
@@ -3407,7 +3412,7 @@ export interface paths {
          * Store List
          * @description Store a CSV list or a DCF as a parameter set of a drive family.
          *
-         *     Nothing is written to a drive: compare it first, as any other set.
+         *     Nothing is written to a drive: compare it first, like any other set.
          */
         post: operations["store_list"];
         delete?: never;
@@ -3425,12 +3430,12 @@ export interface paths {
         };
         /**
          * Download Set
-         * @description The file itself, the latest version or another.
+         * @description Download the file, by default the latest version.
          */
         get: operations["download_set"];
         /**
          * Upload Set
-         * @description Store a file from elsewhere; what is no usable parameter set is refused.
+         * @description Store an uploaded file; one that is not a usable parameter set is refused.
          */
         put: operations["upload_set"];
         post?: never;
@@ -3453,9 +3458,9 @@ export interface paths {
         };
         /**
          * Export Set
-         * @description A stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
+         * @description Export a stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
          *
-         *     Parameters without an object (only Modbus reaches them) are not in a DCF.
+         *     A DCF leaves out parameters without an object (those that only Modbus reaches).
          */
         get: operations["export_set"];
         put?: never;
@@ -3477,7 +3482,7 @@ export interface paths {
         put?: never;
         /**
          * Set Up
-         * @description Make the first administrator, with the code that is in the terminal.
+         * @description Make the first administrator, with the code that is shown in the terminal.
          */
         post: operations["set_up"];
         delete?: never;
@@ -3497,10 +3502,10 @@ export interface paths {
         put?: never;
         /**
          * Stop
-         * @description STOP: always allowed, for everyone; without a body, of every axis.
+         * @description STOP: always permitted, to everybody; without a body, for every axis.
          *
-         *     The quick stop goes out at once; the answer comes when the axes stand, or after the time that
-         *     their ramps allow and what is done then.
+         *     The quick stop is sent at once. The answer follows when the axes are at standstill, or after the
+         *     time that their ramps allow and the measures taken then.
          */
         post: operations["stop"];
         delete?: never;
@@ -3518,13 +3523,13 @@ export interface paths {
         };
         /**
          * Tokens
-         * @description Tokens for scripts: the own ones; for an administrator all.
+         * @description List tokens for scripts: one's own; for an administrator all.
          */
         get: operations["tokens"];
         put?: never;
         /**
          * Make Token
-         * @description Make a token for a script. It can do no more than its owner.
+         * @description Make a token for a script. Its rights are limited to those of its owner.
          */
         post: operations["make_token"];
         delete?: never;
@@ -3562,7 +3567,7 @@ export interface paths {
         };
         /**
          * List Tools
-         * @description Every tool: its words, and the form of its settings.
+         * @description List all tools with their texts and the schema of their settings.
          */
         get: operations["list_tools"];
         put?: never;
@@ -3579,7 +3584,7 @@ export interface components {
     schemas: {
         /**
          * AccountChange
-         * @description Another role, or another password; null leaves it.
+         * @description New role or new password; null leaves the value unchanged.
          */
         AccountChange: {
             /** Password */
@@ -3588,7 +3593,7 @@ export interface components {
         };
         /**
          * AccountInfo
-         * @description Somebody who may log in.
+         * @description An account, with its numbers of sessions and tokens.
          */
         AccountInfo: {
             /**
@@ -3610,7 +3615,7 @@ export interface components {
         };
         /**
          * ActiveFault
-         * @description A fault or warning that is present now.
+         * @description A fault or warning that is active now.
          */
         ActiveFault: {
             /** Causes */
@@ -3633,7 +3638,7 @@ export interface components {
         };
         /**
          * AgainInfo
-         * @description A loop that answered otherwise than predicted, and what was made of it.
+         * @description A loop whose response differed from the prediction, and the outcome of the redesign.
          */
         AgainInfo: {
             /** Closed Db */
@@ -3651,7 +3656,7 @@ export interface components {
         };
         /**
          * AliasRequest
-         * @description A station alias to write to the EEPROM of a slave.
+         * @description Station alias to write to the EEPROM of a slave.
          */
         AliasRequest: {
             /** Alias */
@@ -3668,7 +3673,7 @@ export interface components {
         };
         /**
          * ArmRequest
-         * @description Whether a fault freezes the last seconds.
+         * @description Whether a fault makes a support bundle of the last seconds.
          */
         ArmRequest: {
             /** Armed */
@@ -3729,7 +3734,7 @@ export interface components {
         };
         /**
          * AuditNames
-         * @description What can be chosen in a filter.
+         * @description Values that can be chosen in a filter.
          */
         AuditNames: {
             /** Axes */
@@ -3743,7 +3748,7 @@ export interface components {
         };
         /**
          * AuditPage
-         * @description Entries, newest first. ``next`` is what to give as ``before`` for the ones after them.
+         * @description Entries, newest first. ``next`` is the value of ``before`` for the following page.
          */
         AuditPage: {
             /** Events */
@@ -3800,7 +3805,7 @@ export interface components {
         };
         /**
          * AutotuneAnswer
-         * @description All that was measured and decided; ``before`` holds raw values that undo what was applied.
+         * @description Everything measured and decided; ``before`` holds raw values that undo what was applied.
          */
         AutotuneAnswer: {
             /**
@@ -3862,7 +3867,7 @@ export interface components {
         };
         /**
          * AutotuneRequest
-         * @description All steps in one job.
+         * @description Settings of a tuning; all its steps are one job.
          */
         AutotuneRequest: {
             /**
@@ -3951,9 +3956,10 @@ export interface components {
         };
         /**
          * AxisHealth
-         * @description One axis. ``changed`` counts findings that are changes, ``suspected`` those to be repeated.
+         * @description Condition of one axis.
          *
-         *     ``other_settings`` counts rounds after the baseline that were measured otherwise.
+         *     ``changed`` is the number of changed quantities, ``suspected`` the number of those to be
+         *     measured again, ``other_settings`` the number of rounds after the baseline with other settings.
          */
         AxisHealth: {
             /** Axis */
@@ -3981,7 +3987,7 @@ export interface components {
         };
         /**
          * AxisInfo
-         * @description The drive that something was made with.
+         * @description Identity of the drive that an item was made with.
          */
         AxisInfo: {
             /** Firmware */
@@ -4001,7 +4007,7 @@ export interface components {
         };
         /**
          * AxisRecordInfo
-         * @description What the bench keeps of an axis, its mechanics and the watch list, and its gentlest ramp.
+         * @description Stored mechanics and watch list of an axis, and the gentlest ramp of its drive.
          */
         AxisRecordInfo: {
             /**
@@ -4111,7 +4117,7 @@ export interface components {
         };
         /**
          * AxisStopInfo
-         * @description What STOP reached at one axis, by its measured motion.
+         * @description Verdict of STOP at one axis, from its measured motion.
          */
         AxisStopInfo: {
             /** Drive */
@@ -4157,7 +4163,7 @@ export interface components {
         };
         /**
          * BandInfo
-         * @description Margins over one band; None where nothing crosses there.
+         * @description Margins over one band; None where there is no crossover in it.
          */
         BandInfo: {
             gain_margin_db: components["schemas"]["IntervalInfo"] | null;
@@ -4170,7 +4176,7 @@ export interface components {
         };
         /**
          * BaselineRequest
-         * @description Which rounds are the baseline, and who signs where nobody is logged in by name.
+         * @description Rounds that form the baseline, and who signs it where nobody is logged in by name.
          */
         BaselineRequest: {
             /**
@@ -4188,7 +4194,7 @@ export interface components {
         };
         /**
          * BoxChange
-         * @description The name is in force from the next start of the server on, the ports at once.
+         * @description New settings. The name takes effect at the next start of the server, the ports at once.
          */
         BoxChange: {
             /**
@@ -4206,7 +4212,7 @@ export interface components {
         };
         /**
          * BoxInfo
-         * @description What was set up, and what could be chosen.
+         * @description Current settings, and the ports that can be chosen.
          */
         BoxInfo: {
             /** Configured */
@@ -4250,7 +4256,7 @@ export interface components {
         };
         /**
          * BrakeResult
-         * @description The worse direction decides. ``measured_at`` is ISO 8601, UTC.
+         * @description Result of both directions; the worse one decides. ``measured_at`` is ISO 8601, UTC.
          */
         BrakeResult: {
             /** Brake Rated Nm */
@@ -4401,10 +4407,10 @@ export interface components {
         };
         /**
          * BrakeTest
-         * @description How the holding brake stays closed while the axis is enabled, so that it can be tested.
+         * @description How the holding brake can be kept closed while the axis is enabled, to test it.
          *
-         *     Either ``output_function`` (a function that never switches the brake's output on by itself,
-         *     given to it meanwhile) or ``obstacle``: why the drive has no such way.
+         *     Either ``output_function`` (a function that never switches the brake output on by itself,
+         *     assigned to it for the test) or ``obstacle``: why the drive has no such way.
          */
         BrakeTest: {
             /**
@@ -4419,7 +4425,7 @@ export interface components {
         };
         /**
          * BrakeTiming
-         * @description Holding brake: which parameters hold the times of its course.
+         * @description Holding brake: the parameters with the times of its sequence.
          *
          *     ``open_fixed_ms`` is a printed time that cannot be set.
          */
@@ -4478,11 +4484,13 @@ export interface components {
         };
         /**
          * BrakeWay
-         * @description One direction. Travel counts from a preload of a tenth of the test torque, which takes up
-         *     play; ``windup_rev`` comes back when the torque goes, ``slip_rev`` does not.
+         * @description One direction.
          *
-         *     ``torque_percent`` is what the shaft carried: at the test torque, or where the brake began to
-         *     slip. The friction of the motor's bearings is part of it, and the pull of a load.
+         *     Travel counts from a preload of a tenth of the test torque, which takes up backlash;
+         *     ``windup_rev`` is elastic and returns with the torque, ``slip_rev`` does not.
+         *
+         *     ``torque_percent`` is the torque at the shaft: at the test torque, or where the brake began to
+         *     slip. It includes the friction of the motor's bearings and the static torque of a load.
          */
         BrakeWay: {
             /**
@@ -4526,7 +4534,7 @@ export interface components {
         };
         /**
          * BrakingInfo
-         * @description Energies of one stop in J, powers in W, resistances in Ω.
+         * @description Result of the braking calculation: energies of one stop [J], powers [W], resistances [Ω].
          */
         BrakingInfo: {
             /** Average W */
@@ -4555,7 +4563,7 @@ export interface components {
         };
         /**
          * BrakingRequest
-         * @description What is braked, and with what. SI units; what is unknown is null.
+         * @description The braking cycle and the resistors. SI units except rpm; unknown values are null.
          */
         BrakingRequest: {
             /** Built In Ohm */
@@ -4628,7 +4636,7 @@ export interface components {
         };
         /**
          * BundleRequest
-         * @description Why a support bundle is made.
+         * @description Reason for making a support bundle.
          */
         BundleRequest: {
             /**
@@ -4653,7 +4661,7 @@ export interface components {
         };
         /**
          * Cancellation
-         * @description Why a job was cancelled, and what to do about it; the sentences are for whoever asked.
+         * @description Why a job was cancelled, and the remedy; sentences are in the language of the request.
          */
         Cancellation: {
             /** Cause */
@@ -4667,7 +4675,7 @@ export interface components {
         };
         /**
          * CandidateInfo
-         * @description A design: what it sets, and what is predicted of it.
+         * @description A design: its settings and the predicted figures.
          */
         CandidateInfo: {
             /** Bandwidth Hz */
@@ -4691,7 +4699,7 @@ export interface components {
         };
         /**
          * CandidatesInfo
-         * @description The table, fastest first; up to three rows carry a mark.
+         * @description Candidates, fastest first; up to three of them carry a mark.
          */
         CandidatesInfo: {
             /** Candidates */
@@ -4701,7 +4709,7 @@ export interface components {
         };
         /**
          * CandidatesRequest
-         * @description Design on a stored frequency response of the mechanics.
+         * @description Request for designs on a stored frequency response of the mechanics.
          */
         CandidatesRequest: {
             /** Inertia Kgm2 */
@@ -4718,7 +4726,7 @@ export interface components {
         };
         /**
          * ChangeRecording
-         * @description What people write about a recording; absent things stay.
+         * @description Remarks on a recording; values that are left out stay unchanged.
          */
         ChangeRecording: {
             /** Kept */
@@ -4730,7 +4738,7 @@ export interface components {
         };
         /**
          * Chat
-         * @description A line for everybody on the station.
+         * @description A chat line for everybody on the station.
          */
         Chat: {
             /** Text */
@@ -4777,7 +4785,7 @@ export interface components {
         };
         /**
          * Check
-         * @description One line of the checklist. ``finding`` is a text of the tool under the check's name.
+         * @description One line of the checklist. ``finding`` names a text of the tool under the check's name.
          */
         Check: {
             /** Finding */
@@ -4797,13 +4805,13 @@ export interface components {
         };
         /**
          * Code
-         * @description What hinders.
+         * @description Kind of obstacle.
          * @enum {string}
          */
         Code: "no_interface" | "missing_capability" | "wireless" | "interface_down" | "no_carrier" | "dhcp_on_port" | "port_managed" | "port_carries_ip" | "on_battery" | "busy_core" | "no_real_time" | "stolen_time" | "memory_not_locked" | "deep_idle" | "governor" | "coalescing" | "irq_on_busy_core" | "irq_balanced" | "grouped_frames" | "kernel";
         /**
          * ConnectRequest
-         * @description Make a found station a drive of this bench.
+         * @description Connect a found station as a drive of this bench.
          */
         ConnectRequest: {
             /**
@@ -4820,7 +4828,7 @@ export interface components {
         };
         /**
          * CountersRequest
-         * @description Whose error counters to set to zero; None is all stations.
+         * @description Station whose error counters are cleared; null: all stations.
          */
         CountersRequest: {
             /** Station */
@@ -4830,7 +4838,7 @@ export interface components {
         };
         /**
          * CursorMoved
-         * @description Somebody else's cursor on a plot.
+         * @description Cursor of another person on a plot.
          */
         CursorMoved: {
             /** Connection */
@@ -4858,8 +4866,9 @@ export interface components {
         };
         /**
          * CycleHeat
-         * @description Ends of a range over motors that agree with the catalogue. Seconds count from a motor as
-         *     cold as its surroundings; null: never, or (as the earlier end) not known.
+         * @description Range over the motors that match the catalogue data.
+         *
+         *     Times count from a motor at ambient temperature; null: never, or (as the earlier end) not known.
          */
         CycleHeat: {
             /**
@@ -4901,7 +4910,7 @@ export interface components {
         };
         /**
          * CyclePower
-         * @description Mechanical, at the shaft: what comes back to the drive is less, by the losses of both.
+         * @description Mechanical power at the shaft; less braking energy reaches the drive, by the losses.
          */
         CyclePower: {
             /**
@@ -4920,7 +4929,7 @@ export interface components {
         };
         /**
          * CycleResult
-         * @description ``drive_load_percent`` is what the drive shows of its load, by a rule of its own.
+         * @description Result; ``drive_load_percent`` is the load that the drive reports, by its own rule.
          */
         CycleResult: {
             /**
@@ -5013,7 +5022,7 @@ export interface components {
         };
         /**
          * CycleSettings
-         * @description How long to read, or which recording; and what catalogues state of motor and drive.
+         * @description How long to read, or which recording to use; and catalogue data of motor and drive.
          */
         CycleSettings: {
             /**
@@ -5123,7 +5132,7 @@ export interface components {
         };
         /**
          * CyclicRequest
-         * @description Begin to exchange process data with all drives of a bus.
+         * @description Start to exchange process data with all drives of a bus.
          */
         CyclicRequest: {
             /**
@@ -5136,7 +5145,7 @@ export interface components {
         };
         /**
          * DescribedDevice
-         * @description One device of a maker's file: a file often holds a whole series.
+         * @description One device of a maker's file, which often contains a whole series.
          */
         DescribedDevice: {
             /** Name */
@@ -5148,7 +5157,7 @@ export interface components {
         };
         /**
          * DesignedShaper
-         * @description A shaper and its prediction: what is left, of the unshaped vibration at the same time.
+         * @description A shaper and its prediction: the residual in % of the unshaped vibration at the same time.
          */
         DesignedShaper: {
             /**
@@ -5182,7 +5191,7 @@ export interface components {
         };
         /**
          * DetectedInfo
-         * @description Median motion on lines that were left empty, as a share of that on the lines around.
+         * @description Median motion on lines left empty, as a share of that on the lines around them.
          */
         DetectedInfo: {
             /**
@@ -5203,7 +5212,7 @@ export interface components {
         };
         /**
          * Diff
-         * @description A parameter set against a drive.
+         * @description Comparison of a parameter set with a drive.
          */
         Diff: {
             /** Drive */
@@ -5298,7 +5307,7 @@ export interface components {
         };
         /**
          * DoctorCause
-         * @description A possible cause; the texts in English and Chinese.
+         * @description A possible cause, with texts in English and Chinese.
          */
         DoctorCause: {
             /** Code */
@@ -5318,9 +5327,9 @@ export interface components {
         };
         /**
          * DoctorFact
-         * @description A piece of evidence as it is and as it should be (null: nobody says).
+         * @description A piece of evidence: actual and expected value (null: not specified).
          *
-         *     ``shown`` and ``shown_expected`` are the same in the notation of manuals.
+         *     ``shown`` and ``shown_expected`` are the same values in the notation of manuals.
          */
         DoctorFact: {
             /** Actual */
@@ -5340,7 +5349,7 @@ export interface components {
         };
         /**
          * DoctorTrial
-         * @description A setting of servodeck's own bring-up that may be the cause, and what can be tried.
+         * @description A setting of servodeck's own bring-up that may be the cause, and the value to try.
          */
         DoctorTrial: {
             /**
@@ -5366,7 +5375,7 @@ export interface components {
         };
         /**
          * DriveIdentification
-         * @description Identification that a bit of the control word starts, while an object counts its states.
+         * @description Identification started by a bit of the control word; an object reports its state.
          */
         DriveIdentification: {
             /** Control Bit */
@@ -5456,7 +5465,7 @@ export interface components {
         };
         /**
          * DriveUpdate
-         * @description Name or notes of a drive.
+         * @description New name or notes of a drive.
          */
         DriveUpdate: {
             /**
@@ -5472,7 +5481,7 @@ export interface components {
         };
         /**
          * DrivesChanged
-         * @description The list of drives, or quality, lease or counts of one, changed.
+         * @description Change in the list of drives, or in quality, control or counts of a drive.
          */
         DrivesChanged: {
             /** Drives */
@@ -5486,7 +5495,7 @@ export interface components {
         };
         /**
          * DwellEstimate
-         * @description A value with its 95 % interval, in the unit that the field's name says.
+         * @description A value with its 95 % interval, in the unit of the field's name.
          */
         DwellEstimate: {
             /** Ci95 */
@@ -5499,7 +5508,7 @@ export interface components {
         };
         /**
          * DwellFinding
-         * @description What the dwell showed, as a code with the figure that it rests on.
+         * @description A finding of the dwell: a code and the figure that it rests on.
          */
         DwellFinding: {
             /**
@@ -5517,7 +5526,7 @@ export interface components {
         };
         /**
          * DwellHarmonic
-         * @description A multiple of the frequency, which only what is not linear makes.
+         * @description Amplitude at a multiple of the frequency; only a non-linearity causes one.
          */
         DwellHarmonic: {
             /** Multiple */
@@ -5532,10 +5541,10 @@ export interface components {
         };
         /**
          * DwellResult
-         * @description Amplitudes at the frequency, at full amplitude of the excitation.
+         * @description Amplitudes at the excitation frequency, at full amplitude of the excitation.
          *
-         *     The phase is that of the speed over the excitation as the bus shows both: the time that
-         *     setpoints and samples take on the bus is part of it.
+         *     The phase is that of the speed relative to the excitation, both as seen on the bus: it includes
+         *     the delay of setpoints and samples on the bus.
          */
         DwellResult: {
             /**
@@ -5593,7 +5602,7 @@ export interface components {
         };
         /**
          * DwellSettings
-         * @description A sine of the speed setpoint, or of torque ahead of the speed loop, faded in and out.
+         * @description A sine of the speed setpoint, or of the torque offset, faded in and out.
          */
         DwellSettings: {
             /**
@@ -5674,7 +5683,7 @@ export interface components {
         };
         /**
          * EepromComparison
-         * @description The EEPROM of a slave next to a file.
+         * @description Comparison of the EEPROM of a slave with a file.
          */
         EepromComparison: {
             /** Alias */
@@ -5701,7 +5710,7 @@ export interface components {
         };
         /**
          * EepromDifference
-         * @description A field of the EEPROM: what it has (``first``) and what the file has, as bytes in hex.
+         * @description A field in the EEPROM (``first``) and in the file (``second``), as bytes in hex.
          */
         EepromDifference: {
             /**
@@ -5724,7 +5733,7 @@ export interface components {
         };
         /**
          * EepromPlan
-         * @description What is, or was, to be written.
+         * @description Contents of a planned or completed change of an EEPROM.
          */
         EepromPlan: {
             /** Changes */
@@ -5763,7 +5772,7 @@ export interface components {
         };
         /**
          * EnableRelease
-         * @description The enabling button was let go.
+         * @description The enabling button was released.
          */
         EnableRelease: {
             /** Invitation */
@@ -5812,7 +5821,7 @@ export interface components {
         };
         /**
          * Estimate
-         * @description A value with its 95 % interval, in the unit that the field's name says.
+         * @description A value with its 95 % interval, in the unit of the field's name.
          */
         Estimate: {
             /** Ci95 */
@@ -5825,7 +5834,7 @@ export interface components {
         };
         /**
          * EthercatPermissions
-         * @description What is missing to use an interface, and the commands that grant it.
+         * @description Permissions that are missing to use an interface, and the commands that grant them.
          */
         EthercatPermissions: {
             /**
@@ -5851,7 +5860,7 @@ export interface components {
         };
         /**
          * EthercatSegment
-         * @description A segment as it is now.
+         * @description State of a segment now.
          */
         EthercatSegment: {
             /** Connected */
@@ -5891,7 +5900,7 @@ export interface components {
         };
         /**
          * ExcitationInfo
-         * @description What a frequency response would play, as far as it is known before the axis is felt.
+         * @description Excitation of a frequency response, as far as it is known before the axis is measured.
          */
         ExcitationInfo: {
             /**
@@ -5929,10 +5938,10 @@ export interface components {
         };
         /**
          * FaultHistory
-         * @description Where a drive keeps its past faults.
+         * @description Where a drive stores its past faults.
          *
          *     *slots*: each record has parameters of its own, newest first. *selected*: writing a number to
-         *     ``select_key`` brings one record to the same parameters. *unreadable*: the drive keeps
+         *     ``select_key`` selects the record that the same parameters show. *unreadable*: the drive stores
          *     records for which the manual prints no object.
          */
         FaultHistory: {
@@ -5992,7 +6001,7 @@ export interface components {
         };
         /**
          * FaultHistoryInfo
-         * @description How a drive keeps past faults, and those that were read.
+         * @description How a drive keeps past faults, and the ones that were read.
          */
         FaultHistoryInfo: {
             /**
@@ -6020,7 +6029,7 @@ export interface components {
         };
         /**
          * FiguresInfo
-         * @description Of one loop, read on the lines that were verified; None beyond them.
+         * @description Figures of one loop, read on the verified lines; None outside them.
          */
         FiguresInfo: {
             /** Bandwidth Hz */
@@ -6032,7 +6041,7 @@ export interface components {
         };
         /**
          * FiltersInfo
-         * @description Corners of filters that the drive can be given; None: not there, or unknown.
+         * @description Corner frequencies of filters that can be set in the drive; None: absent or unknown.
          */
         FiltersInfo: {
             /** Speed Hz */
@@ -6042,8 +6051,10 @@ export interface components {
         };
         /**
          * FirstPowerResult
-         * @description ``measured_at`` is ISO 8601, UTC. ``covers_pole_pairs``: fewer could hide two exchanged
-         *     phases within this travel. ``guide`` is the drive's own procedure for the commutation angle.
+         * @description Result; ``measured_at`` is ISO 8601, UTC.
+         *
+         *     ``covers_pole_pairs``: with fewer pole pairs, two exchanged phases could stay undetected within
+         *     this travel. ``guide`` is the drive's own procedure for the commutation angle.
          */
         FirstPowerResult: {
             /** Checks */
@@ -6090,9 +6101,9 @@ export interface components {
         };
         /**
          * FirstPowerSettings
-         * @description Limits of the motion, and which parts of the checklist are made.
+         * @description Limits of the motion, the parts of the checklist to carry out, and statements on the load.
          *
-         *     Nothing is energised without one of the two statements about what hangs at the axis.
+         *     The motor is energised only with one of the two statements about what hangs at the axis.
          */
         FirstPowerSettings: {
             /**
@@ -6204,10 +6215,10 @@ export interface components {
         };
         /**
          * Forcing
-         * @description A way to overrule terminals: outputs that are forced, or inputs that are simulated.
+         * @description A way to override terminals: outputs that are forced, or inputs that are simulated.
          *
-         *     A terminal is overruled while its bit in ``enable`` is set, and then follows its bit in
-         *     ``value``. Without ``enable`` a set bit in ``value`` overrules by itself and only to "on".
+         *     A terminal is overridden while its bit in ``enable`` is set, and then follows its bit in
+         *     ``value``. Without ``enable``, a set bit in ``value`` overrides by itself and only to "on".
          */
         Forcing: {
             enable?: components["schemas"]["TerminalBits"] | null;
@@ -6244,7 +6255,7 @@ export interface components {
         };
         /**
          * ForcingInfo
-         * @description A way to overrule terminals, and the session that does.
+         * @description A way to force terminals, and the session that does.
          */
         ForcingInfo: {
             /** Help */
@@ -6280,7 +6291,7 @@ export interface components {
         };
         /**
          * ForcingStart
-         * @description Begin a session; the warning was agreed to.
+         * @description Begin a forcing session; ``confirmed`` states that the user agreed to the warning.
          */
         ForcingStart: {
             /**
@@ -6291,7 +6302,7 @@ export interface components {
         };
         /**
          * ForcingValues
-         * @description Terminals to overrule (null releases). Empty: the page is alive.
+         * @description Terminals to force (null releases). An empty request only renews the session.
          */
         ForcingValues: {
             /** Values */
@@ -6301,7 +6312,7 @@ export interface components {
         };
         /**
          * FoundDrive
-         * @description One drive seen by a scan.
+         * @description One drive found by a scan.
          */
         FoundDrive: {
             /** Alias */
@@ -6348,7 +6359,7 @@ export interface components {
         };
         /**
          * FrictionPoint
-         * @description Torque at one constant speed; negative speeds turn backwards. A load's pull is part of it.
+         * @description Torque at one constant speed, negative backwards; it includes the static torque of a load.
          */
         FrictionPoint: {
             /**
@@ -6368,10 +6379,10 @@ export interface components {
         };
         /**
          * FrictionResult
-         * @description The map. ``curve_*`` is the model through the points, over the speeds measured only.
+         * @description The map. ``curve_*`` is the model through the points, over the measured speeds only.
          *
          *     The model: torque = load + sign(v) · (Coulomb + Stribeck · exp(-(|v|/v_s)^δ)) + viscous · v.
-         *     Parameters are None where the data cannot say them; ``findings`` say why.
+         *     Parameters are None where the data do not determine them; ``findings`` state why.
          */
         FrictionResult: {
             /**
@@ -6442,7 +6453,7 @@ export interface components {
          * FrictionSettings
          * @description Speeds of the map; its limits are those of every measurement.
          *
-         *     The time limit is that of all moves together: slow speeds are left out where it ends them.
+         *     The time limit applies to all moves together: slow speeds are left out where it is too short.
          */
         FrictionSettings: {
             /**
@@ -6509,7 +6520,7 @@ export interface components {
         };
         /**
          * Functions
-         * @description Everything a family's pages need beyond its parameters, faults and procedures.
+         * @description Everything that a family's pages need beyond its parameters, faults and procedures.
          */
         Functions: {
             brake?: components["schemas"]["BrakeTiming"] | null;
@@ -6557,7 +6568,7 @@ export interface components {
         };
         /**
          * GainBlock
-         * @description Parameters that sit at one place of the control loops.
+         * @description Parameters that belong to one block of the control loops.
          *
          *     ``set_number`` distinguishes the gain sets between which a drive switches.
          */
@@ -6584,7 +6595,7 @@ export interface components {
         };
         /**
          * GainInfo
-         * @description Gains now; null where they have no printed meaning or do not exist.
+         * @description Present gains; null where they do not exist or their unit is not documented.
          */
         GainInfo: {
             /** Convention */
@@ -6619,19 +6630,21 @@ export interface components {
         };
         /**
          * GainStepInfo
-         * @description One raised gain and the oscillation of the torque in % of the rated (RMS).
+         * @description One raised gain and the oscillation of the torque in % of the rated torque (RMS).
+         *
+         *     ``oscillation_percent`` is None where the drive ended the step, for example by a fault.
          */
         GainStepInfo: {
             /** Gain Db */
             gain_db: number;
             /** Oscillation Percent */
-            oscillation_percent: number;
+            oscillation_percent: number | null;
             /** Stable */
             stable: boolean;
         };
         /**
          * GainStepsInfo
-         * @description The highest gain at which the loop was stable, and the next where it was not.
+         * @description The highest gain with a stable loop, and the next one, where it was not stable.
          */
         GainStepsInfo: {
             /** Onset Db */
@@ -6643,7 +6656,7 @@ export interface components {
         };
         /**
          * GainValues
-         * @description Gains with a physical meaning. ``inertia_kgm2`` is the whole axis'.
+         * @description Gains with a physical meaning. ``inertia_kgm2`` is that of the whole axis.
          */
         GainValues: {
             /** Inertia Kgm2 */
@@ -6680,7 +6693,7 @@ export interface components {
         };
         /**
          * GantryEntry
-         * @description Response from the torque of axis ``torque`` to the speed of axis ``speed``, line by line.
+         * @description Response from the torque of axis ``torque`` to the speed of axis ``speed`` [lines].
          */
         GantryEntry: {
             /** Coherence */
@@ -6704,7 +6717,7 @@ export interface components {
         };
         /**
          * GantryFinding
-         * @description A verdict; ``values`` are figures with their units for the places in its text.
+         * @description A finding; ``values`` are the figures with units for the placeholders of its text.
          */
         GantryFinding: {
             /**
@@ -6722,8 +6735,10 @@ export interface components {
         };
         /**
          * GantryMargins
-         * @description Of both speed loops together, on the measured lines; ``stable`` None where they do not show
-         *     it. ``ms_alone`` is the peak of each axis by itself.
+         * @description Margins of both speed loops together, on the measured lines.
+         *
+         *     ``stable`` is None where the lines do not determine it. ``ms_alone`` is the peak sensitivity of
+         *     each axis by itself.
          */
         GantryMargins: {
             /** Crossover Hz */
@@ -6749,7 +6764,7 @@ export interface components {
         };
         /**
          * GantryMode
-         * @description A resonance of both axes; ``skew_share`` is how much of it is differential, 0 to 1.
+         * @description A resonance of both axes; ``skew_share`` is the differential share of its motion, 0 to 1.
          */
         GantryMode: {
             /** Damping */
@@ -6776,8 +6791,10 @@ export interface components {
         };
         /**
          * GantryMotion
-         * @description Response of the motion alike (mean speed by the sum of both torques), or of the skew
-         *     (difference of the speeds by half the difference of the torques), line by line.
+         * @description Response of the common motion or of the skew [lines].
+         *
+         *     Common: mean speed over the sum of both torques; skew: difference of the speeds over half the
+         *     difference of the torques.
          */
         GantryMotion: {
             /** Half Db */
@@ -6794,14 +6811,14 @@ export interface components {
         };
         /**
          * GantryResult
-         * @description Axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
+         * @description Result; axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
          *
-         *     ``holding_percent`` is the torque that each axis needs on the mean of both directions, without
-         *     friction, and ``fight_percent`` half their difference: what both sides press against each other
-         *     with. ``out_of_square_rev`` is by how much axis 1 is ahead of where the beam would rest.
-         *     Where no coupling shows, neither is stated, nor are modes, inertia and stiffness of the machine.
-         *     ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling, 1 for one rigid body;
-         *     ``relative_gain`` that of axis 1, 1 without coupling.
+         *     ``holding_percent`` is the mean torque of both directions that each axis needs, without
+         *     friction, and ``fight_percent`` half their difference: the torque with which the two sides
+         *     oppose each other. ``out_of_square_rev`` is how far axis 1 is ahead of the position where the
+         *     beam would be free of it. Where no coupling is visible, neither is stated, nor are modes,
+         *     inertia and stiffness of the machine. ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling,
+         *     1 for one rigid body; ``relative_gain`` that of axis 1, 1 without coupling.
          */
         GantryResult: {
             /** Coupling */
@@ -6865,7 +6882,7 @@ export interface components {
         };
         /**
          * GantrySettings
-         * @description The limits of every measurement, for both axes, and what couples them.
+         * @description The limits of every measurement, for both axes, and the data of the pair.
          */
         GantrySettings: {
             /**
@@ -6956,7 +6973,7 @@ export interface components {
         };
         /**
          * GearLimits
-         * @description Bounds on the electronic gear: encoder increments per user increment.
+         * @description Limits of the electronic gear: encoder increments per user increment.
          */
         GearLimits: {
             /**
@@ -7009,7 +7026,7 @@ export interface components {
         };
         /**
          * GearPlanInfo
-         * @description What would be written, and what follows from it.
+         * @description Planned values of the gear, and their consequences.
          */
         GearPlanInfo: {
             /**
@@ -7070,7 +7087,7 @@ export interface components {
         };
         /**
          * GearValueInfo
-         * @description One parameter of the gear: what it is and what it would be.
+         * @description One parameter of the gear: present and planned raw value.
          */
         GearValueInfo: {
             /** Key */
@@ -7084,7 +7101,7 @@ export interface components {
         };
         /**
          * GearWritten
-         * @description The gear as written.
+         * @description Result of writing the gear.
          */
         GearWritten: {
             /**
@@ -7152,7 +7169,7 @@ export interface components {
         };
         /**
          * GoalsInfo
-         * @description The worst margins that were guaranteed or found; None where they are not finite.
+         * @description The worst margins that were guaranteed or found; None where they are infinite.
          */
         GoalsInfo: {
             /** Gain Margin Db */
@@ -7164,13 +7181,13 @@ export interface components {
         };
         /**
          * Grade
-         * @description ``not_measured``: without a measurement nothing is stated of timing.
+         * @description Suitability for a purpose; ``not_measured``: timing is not known without a measurement.
          * @enum {string}
          */
         Grade: "suitable" | "limited" | "unsuitable" | "not_measured";
         /**
          * GrantView
-         * @description What a guest may do, until when, on which axis (null: on all).
+         * @description Rights of a guest, until when, and on which axis (null: on all).
          */
         GrantView: {
             /** By */
@@ -7187,7 +7204,7 @@ export interface components {
         };
         /**
          * Guide
-         * @description A course that a person goes through step by step.
+         * @description A sequence that a person follows step by step.
          */
         Guide: {
             /**
@@ -7220,7 +7237,7 @@ export interface components {
         };
         /**
          * GuideStep
-         * @description One step of a guide: text, parameters to look at, and a procedure to run.
+         * @description One step of a guide: text, parameters to check, and a procedure to run.
          */
         GuideStep: {
             /**
@@ -7271,7 +7288,7 @@ export interface components {
         };
         /**
          * HandoverChanges
-         * @description What the drive holds other than it was handed over; it was read now.
+         * @description Values of the drive, read now, that differ from those handed over.
          */
         HandoverChanges: {
             /** Changed */
@@ -7283,7 +7300,7 @@ export interface components {
         };
         /**
          * HandoverComparison
-         * @description Drive now, our set and the controller's list.
+         * @description Comparison of the drive now, our set and the controller's list.
          */
         HandoverComparison: {
             /** Conflicts */
@@ -7317,7 +7334,7 @@ export interface components {
         };
         /**
          * HandoverConflict
-         * @description A value that the controller writes, or that the drive has, other than ours; raw values.
+         * @description A value that differs between controller, set and drive; raw values.
          */
         HandoverConflict: {
             /**
@@ -7380,7 +7397,7 @@ export interface components {
         };
         /**
          * HandoverRequest
-         * @description The values of one drive's parameter set.
+         * @description Export of the values of one drive's parameter set.
          */
         HandoverRequest: {
             /**
@@ -7462,7 +7479,7 @@ export interface components {
         };
         /**
          * Health
-         * @description The server is alive.
+         * @description State of the server.
          */
         Health: {
             /** Demo */
@@ -7482,7 +7499,7 @@ export interface components {
         };
         /**
          * HealthAttempt
-         * @description One run that was due or asked for, newest first in its list.
+         * @description One attempted run, scheduled or triggered; lists are newest first.
          */
         HealthAttempt: {
             /**
@@ -7506,7 +7523,7 @@ export interface components {
         };
         /**
          * HealthBaselineInfo
-         * @description A signed baseline. ``intact``: its contents still have the checksum of the signing.
+         * @description A signed baseline. ``intact``: its contents still match the checksum of the signature.
          */
         HealthBaselineInfo: {
             /** Id */
@@ -7535,9 +7552,10 @@ export interface components {
         };
         /**
          * HealthFinding
-         * @description One quantity against the baseline; changes are shares (0.1 is 10 % more).
+         * @description Comparison of one quantity with the baseline; changes are fractions (0.1 is 10 % more).
          *
-         *     ``low`` to ``high`` hold the true change but for the level of the whole comparison (99 %).
+         *     ``low`` to ``high`` is the confidence interval of the true change, at 99 %
+         *     for the whole comparison.
          */
         HealthFinding: {
             /** Before */
@@ -7580,7 +7598,7 @@ export interface components {
         };
         /**
          * HealthPermissionInfo
-         * @description The standing permission of an axis' health check. ``ended`` states why it permits nothing.
+         * @description Standing permission of an axis' health check. ``ended`` is why it is no longer valid.
          */
         HealthPermissionInfo: {
             /**
@@ -7626,7 +7644,7 @@ export interface components {
         };
         /**
          * HealthPermissionRequest
-         * @description What is permitted. ``person`` counts where the page is used without accounts.
+         * @description A permission to give. ``person`` is used on stations without accounts.
          */
         HealthPermissionRequest: {
             /**
@@ -7690,7 +7708,7 @@ export interface components {
         };
         /**
          * HealthRound
-         * @description All quantities of one round. ``missing``: measured, but without an answer.
+         * @description All quantities of one round. ``missing``: measured, but without a result.
          */
         HealthRound: {
             /**
@@ -7731,9 +7749,9 @@ export interface components {
         };
         /**
          * HealthSettings
-         * @description One envelope for all measurements; two results compare only with equal settings.
+         * @description One envelope for all measurements; results are comparable only with equal settings.
          *
-         *     The time limit is that of each measurement.
+         *     The time limit applies to each measurement.
          */
         HealthSettings: {
             /**
@@ -7825,10 +7843,10 @@ export interface components {
         };
         /**
          * HealthValue
-         * @description One quantity of one round; ``low`` and ``high`` are its 95 % interval where one is known.
+         * @description One quantity of one round; ``low`` and ``high`` are its 95 % interval where known.
          *
-         *     ``number`` counts quantities of a name from 1, by rising frequency. Friction is in % of rated
-         *     torque, half the difference of both directions, as the mean over the speeds.
+         *     ``number`` counts quantities of the same name from 1, by rising frequency. Friction is in % of
+         *     rated torque: half the difference of both directions, averaged over the speeds.
          */
         HealthValue: {
             /** High */
@@ -7866,7 +7884,7 @@ export interface components {
         };
         /**
          * HistorySlot
-         * @description One remembered fault that has parameters of its own; ``name`` empty: named by its number.
+         * @description One stored fault with parameters of its own; ``name`` empty: named by its number.
          */
         HistorySlot: {
             /** Code Key */
@@ -7884,7 +7902,7 @@ export interface components {
         };
         /**
          * HomeRequest
-         * @description Homing.
+         * @description Homing by one of the drive's methods.
          */
         HomeRequest: {
             /** Acceleration */
@@ -7940,7 +7958,7 @@ export interface components {
         };
         /**
          * IdentifyRequest
-         * @description Let the drive identify motor and load; travel in the axis' unit from the start point.
+         * @description Identification of motor and load by the drive; travel [rev] from the start point.
          */
         IdentifyRequest: {
             /**
@@ -7964,7 +7982,7 @@ export interface components {
         };
         /**
          * ImportFinding
-         * @description Something odd about a description: where, what, and what was made of it.
+         * @description An irregularity in a description: its place, what it is, and how it was handled.
          */
         ImportFinding: {
             /**
@@ -8020,7 +8038,7 @@ export interface components {
         };
         /**
          * ImportedList
-         * @description A CSV list stored as a parameter set; lines that could not be used say why.
+         * @description A CSV list stored as a parameter set, with the problems of lines that could not be used.
          */
         ImportedList: {
             /** File */
@@ -8037,7 +8055,7 @@ export interface components {
         };
         /**
          * InertiaAnswer
-         * @description Values are None where they are not finite; they count only where ``identifiable``.
+         * @description Result; values are None where not finite, and valid only where ``identifiable``.
          */
         InertiaAnswer: {
             ci95: components["schemas"]["InertiaIntervals"];
@@ -8152,7 +8170,7 @@ export interface components {
         };
         /**
          * InertiaRequest
-         * @description Inertia and friction.
+         * @description Settings of an inertia and friction measurement.
          */
         InertiaRequest: {
             /**
@@ -8234,7 +8252,7 @@ export interface components {
         };
         /**
          * Interfaces
-         * @description What this machine can connect through.
+         * @description Interfaces of this machine through which drives can be connected.
          */
         Interfaces: {
             /**
@@ -8254,7 +8272,7 @@ export interface components {
         };
         /**
          * IntervalInfo
-         * @description A value and the limits that hold the truth in 95 of 100 cases; None: without a limit.
+         * @description A value and its 95 % confidence interval; a limit of None is unbounded.
          */
         IntervalInfo: {
             /** High */
@@ -8266,7 +8284,7 @@ export interface components {
         };
         /**
          * InvitationView
-         * @description An invitation. ``code`` is shown to those who may invite; ``enabled``: the button is held.
+         * @description An invitation. ``code`` is for people who may invite; ``enabled``: the button is held.
          */
         InvitationView: {
             /** Allowed */
@@ -8339,7 +8357,7 @@ export interface components {
         };
         /**
          * JobInfo
-         * @description A piece of long work.
+         * @description A job: long work that runs in the background.
          */
         JobInfo: {
             /** @description why it was cancelled, where that is known */
@@ -8375,13 +8393,13 @@ export interface components {
             state: "running" | "done" | "failed" | "cancelled";
             /**
              * Step
-             * @description in English
+             * @description in the language of the request
              */
             step: string;
             step_message: components["schemas"]["MessageInfo"];
             /**
              * Title
-             * @description in English
+             * @description in the language of the request
              */
             title: string;
             /** @description of text, as code and facts */
@@ -8389,8 +8407,7 @@ export interface components {
         };
         /**
          * JogEnded
-         * @description The jog of this connection ended: why, or with which problem; the words are for whoever
-         *     jogs.
+         * @description End of a jog of this connection; reason and remedy in the language of the connection.
          */
         JogEnded: {
             /** Drive */
@@ -8427,7 +8444,7 @@ export interface components {
         };
         /**
          * JogGap
-         * @description The signs of life of a jog had a gap: the axis brakes, or goes on after it.
+         * @description Gap in the renewals of a jog: the axis brakes, or continues after the gap.
          */
         JogGap: {
             /**
@@ -8451,10 +8468,10 @@ export interface components {
         };
         /**
          * JogRenew
-         * @description A sign of life: the button is still held. Send at 20 Hz or faster.
+         * @description Renewal of a jog: the button is still held. Send at 20 Hz or faster.
          *
-         *     The axis brakes where none comes for 200 ms, and goes on where the hold is alive again within
-         *     500 ms and was never released.
+         *     The axis brakes if none arrives for 200 ms, and continues if renewals resume within 500 ms and
+         *     the button was not released.
          */
         JogRenew: {
             /** Drive */
@@ -8498,9 +8515,9 @@ export interface components {
         };
         /**
          * JogStart
-         * @description Begin to jog; the axis must be enabled or may be enabled (``enable``).
+         * @description Begin to jog; an axis that is not enabled is enabled for the jog.
          *
-         *     The job ends when the renewals stop, the socket closes or the lease is lost.
+         *     The job ends when the renewals stop, the socket closes or control is lost.
          */
         JogStart: {
             /**
@@ -8578,7 +8595,7 @@ export interface components {
         };
         /**
          * JoinAsGuest
-         * @description The secret of an invitation's link, and the code that was reported.
+         * @description The secret of an invitation's link, and the code given to the guest.
          */
         JoinAsGuest: {
             /** Code */
@@ -8588,7 +8605,7 @@ export interface components {
         };
         /**
          * LateBin
-         * @description Cycles that woke up less than ``below_us`` late, and not less than the bin before.
+         * @description Cycles that began less than ``below_us`` late, and at least the previous bin's limit.
          */
         LateBin: {
             /**
@@ -8601,7 +8618,7 @@ export interface components {
         };
         /**
          * Lease
-         * @description Who may move and write this axis now; nobody where ``holder`` is None.
+         * @description Holder of control over an axis, who may move and write it; none if ``holder`` is null.
          */
         Lease: {
             /**
@@ -8636,7 +8653,7 @@ export interface components {
         };
         /**
          * LeaseAnswer
-         * @description The holder's answer to whoever asks.
+         * @description The holder's answer to a request for control.
          */
         LeaseAnswer: {
             /** Drive */
@@ -8666,7 +8683,7 @@ export interface components {
         };
         /**
          * LeaseHand
-         * @description Hand control to another connection, for good or for a time, after which it comes back.
+         * @description Hand control to another connection, permanently or for a time, after which it returns.
          */
         LeaseHand: {
             /** Drive */
@@ -8687,7 +8704,7 @@ export interface components {
         };
         /**
          * LeaseNotice
-         * @description Something about control that this person must notice.
+         * @description Notice about control for the person of this connection.
          */
         LeaseNotice: {
             /** Drive */
@@ -8708,9 +8725,9 @@ export interface components {
         };
         /**
          * LeaseOverride
-         * @description Take control from whoever has it; what moves is stopped first. For administrators.
+         * @description Take control from its holder; running motion is stopped first. For administrators.
          *
-         *     From a guest, everybody who may invite can take it.
+         *     Control held by a guest can be taken by everybody who may invite.
          */
         LeaseOverride: {
             /** Drive */
@@ -8724,7 +8741,7 @@ export interface components {
         };
         /**
          * LeaseTake
-         * @description Take, or give back, control of an axis.
+         * @description Take or give up control of an axis.
          */
         LeaseTake: {
             /** Drive */
@@ -8740,7 +8757,7 @@ export interface components {
         };
         /**
          * LeftOutRow
-         * @description A row of the set that is not handed over, and why.
+         * @description A row of the set that is not exported, and why.
          */
         LeftOutRow: {
             /**
@@ -8755,7 +8772,7 @@ export interface components {
         };
         /**
          * LibraryChange
-         * @description Change notes or tags; what is left out stays.
+         * @description Change notes or tags; values that are left out stay unchanged.
          */
         LibraryChange: {
             /**
@@ -8770,7 +8787,7 @@ export interface components {
         };
         /**
          * LibraryEntry
-         * @description Something of the library.
+         * @description One entry of the library.
          */
         LibraryEntry: {
             /**
@@ -8834,7 +8851,7 @@ export interface components {
         };
         /**
          * LineSearchRequest
-         * @description Search the baud rate and parity of a serial bus; few stations, for each costs time.
+         * @description Search the baud rate and parity of a serial bus; few stations, as each costs time.
          */
         LineSearchRequest: {
             /**
@@ -8849,7 +8866,7 @@ export interface components {
         };
         /**
          * LineSearchResult
-         * @description Result of a line search: the URL with the settings found, None where nothing answered.
+         * @description Result of a line search: the URL with the settings found; null if nothing answered.
          */
         LineSearchResult: {
             /** Found */
@@ -8885,8 +8902,10 @@ export interface components {
         };
         /**
          * LoadSideResult
-         * @description ``lost_motion_deg`` is between slow passes in both directions: backlash and what friction
-         *     twists. ``backlash_deg`` is the gap alone. Values are None where the data do not show them;
+         * @description Result of a load-side measurement.
+         *
+         *     ``lost_motion_deg`` is the difference of slow passes in both directions: backlash plus the twist
+         *     by friction. ``backlash_deg`` is the gap alone. Values are None where the data do not show them;
          *     ``findings`` state why.
          */
         LoadSideResult: {
@@ -9008,7 +9027,7 @@ export interface components {
         };
         /**
          * LogEntry
-         * @description The tool's own log.
+         * @description One entry of the station's log.
          */
         LogEntry: {
             /** Drive */
@@ -9042,7 +9061,7 @@ export interface components {
         };
         /**
          * Logged
-         * @description A new entry of the tool's log.
+         * @description A new entry of the station's log.
          */
         Logged: {
             entry: components["schemas"]["LogEntry"];
@@ -9055,7 +9074,7 @@ export interface components {
         };
         /**
          * MadeInvitation
-         * @description A new invitation. ``link`` is the part of the address after the #, shown this once.
+         * @description A new invitation. ``link`` is the part of the address after the #, shown only here.
          */
         MadeInvitation: {
             invitation: components["schemas"]["InvitationView"];
@@ -9064,7 +9083,7 @@ export interface components {
         };
         /**
          * MadeToken
-         * @description A new token. ``secret`` is shown this once.
+         * @description A new token. ``secret`` is shown only here.
          */
         MadeToken: {
             /** Secret */
@@ -9073,7 +9092,7 @@ export interface components {
         };
         /**
          * MarginsInfo
-         * @description Margins of an open loop; None where there is no such crossing.
+         * @description Margins of an open loop; None where there is no such crossover.
          */
         MarginsInfo: {
             /** Crossover Hz */
@@ -9095,7 +9114,7 @@ export interface components {
         };
         /**
          * MeasurementContent
-         * @description Its settings, and its result evaluated again from the raw data.
+         * @description Settings of a measurement, and its result evaluated again from the raw data.
          */
         MeasurementContent: {
             /**
@@ -9158,11 +9177,11 @@ export interface components {
         };
         /**
          * Mechanics
-         * @description What turns the motor's revolution into travel.
+         * @description Mechanics that convert a motor revolution into travel.
          *
-         *     *screw*: ``lead_mm`` per turn. *belt*: ``diameter_mm``, or ``pitch_mm`` times ``teeth`` of the
-         *     pulley. *rack*: ``module_mm`` times ``teeth`` of the pinion, or its ``pitch_mm``. *rotary*: a
-         *     table of 360°. ``motor_turns`` to ``load_turns`` is the gearbox.
+         *     *screw*: ``lead_mm`` per turn. *belt*: ``diameter_mm`` of the pulley, or ``pitch_mm`` times its
+         *     ``teeth``. *rack*: ``module_mm`` or ``pitch_mm`` of the pinion, times its ``teeth``. *rotary*: a
+         *     table of 360°. The gearbox makes ``load_turns`` from ``motor_turns``.
          */
         Mechanics: {
             /** Diameter Mm */
@@ -9199,17 +9218,17 @@ export interface components {
         };
         /**
          * MechanicsUpdate
-         * @description Keep the mechanics of an axis; null forgets them.
+         * @description Store the mechanics of an axis; null deletes them.
          */
         MechanicsUpdate: {
             mechanics: components["schemas"]["Mechanics"] | null;
         };
         /**
          * MessageInfo
-         * @description A message without words: a code of the catalogue and its facts.
+         * @description A message without words: a code of the catalogue and its parameters.
          *
-         *     Empty codes carry words that others made in ``params.words``; the code ``+`` strings the other
-         *     params together with ``params.joint``.
+         *     An empty code carries text from elsewhere in ``params.words``; the code ``+`` joins the other
+         *     params with ``params.joint``.
          */
         MessageInfo: {
             /** Code */
@@ -9221,7 +9240,7 @@ export interface components {
         };
         /**
          * MissingPort
-         * @description A port that a drive's family has and that is not connected.
+         * @description A port that the drive family has and that is not connected.
          */
         MissingPort: {
             /** Groups */
@@ -9255,7 +9274,7 @@ export interface components {
         };
         /**
          * ModelInfo
-         * @description Torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J.
+         * @description Model from torque to velocity: ``gain`` is 1/J of the rigid part, ``pole_rad_s`` b/J.
          */
         ModelInfo: {
             /** Gain */
@@ -9267,7 +9286,7 @@ export interface components {
         };
         /**
          * MotionClass
-         * @description Whether writing an object can cause motion, who says so, and whether it can be changed.
+         * @description Whether writing an object can cause motion, with the origin of that classification.
          */
         MotionClass: {
             /**
@@ -9302,7 +9321,7 @@ export interface components {
         };
         /**
          * MotionClassRequest
-         * @description What writing an object does, by the word of the person who asks.
+         * @description The motion class of an object, as stated by the person of the request.
          */
         MotionClassRequest: {
             /**
@@ -9323,7 +9342,7 @@ export interface components {
         };
         /**
          * MotionSettingWrite
-         * @description A new value of a setting that can start a motion, and why it is set.
+         * @description A new value of a setting that can start a motion, and the reason for it.
          */
         MotionSettingWrite: {
             /** Raw */
@@ -9339,7 +9358,7 @@ export interface components {
         };
         /**
          * MoveNumbers
-         * @description Read-outs of a move; ``settling_s`` counts from the end of the commanded motion.
+         * @description Figures of a move; ``settling_s`` counts from the end of the commanded motion.
          */
         MoveNumbers: {
             /** Following Peak */
@@ -9378,9 +9397,11 @@ export interface components {
             deceleration?: number | null;
             /**
              * Immediate
+             * @description a drive gets one target at a time: moves are not queued
              * @default true
+             * @constant
              */
-            immediate: boolean;
+            immediate: true;
             /**
              * Mode
              * @enum {string}
@@ -9434,7 +9455,7 @@ export interface components {
         };
         /**
          * NetworkInterface
-         * @description A network interface that could carry EtherCAT.
+         * @description A network interface that can be used for EtherCAT.
          */
         NetworkInterface: {
             /** Name */
@@ -9466,7 +9487,7 @@ export interface components {
         };
         /**
          * NewGrant
-         * @description Let a guest do more for some minutes, on one axis or (null) on all.
+         * @description Rights for a guest for some minutes, on one axis or (null) on all.
          */
         NewGrant: {
             /** Drive */
@@ -9478,7 +9499,7 @@ export interface components {
         };
         /**
          * NewInvitation
-         * @description An invitation for one guest.
+         * @description An invitation for one guest: rights that may be granted, and lifetime.
          */
         NewInvitation: {
             /**
@@ -9496,7 +9517,7 @@ export interface components {
         };
         /**
          * NewToken
-         * @description A token for scripts.
+         * @description A token to make: name, scopes and lifetime.
          */
         NewToken: {
             /**
@@ -9511,7 +9532,7 @@ export interface components {
         };
         /**
          * NotchInfo
-         * @description Centre, width and depth, which is negative.
+         * @description Centre, width and depth of a notch; the depth is negative.
          */
         NotchInfo: {
             /** Center Hz */
@@ -9523,7 +9544,7 @@ export interface components {
         };
         /**
          * NotchPreviewInfo
-         * @description What they would become, and their common response at the frequencies asked for.
+         * @description Realised notches, and their combined response at the requested frequencies.
          */
         NotchPreviewInfo: {
             /** Magnitude Db */
@@ -9588,7 +9609,7 @@ export interface components {
         };
         /**
          * Origin
-         * @description How a scale is known.
+         * @description Origin of a scale.
          * @enum {string}
          */
         Origin: "manual" | "makers_file" | "drive" | "user" | "measured" | "unknown";
@@ -9621,7 +9642,7 @@ export interface components {
         };
         /**
          * ParameterRow
-         * @description Description and value.
+         * @description Description and last reading of a parameter.
          */
         ParameterRow: {
             /**
@@ -9715,7 +9736,7 @@ export interface components {
         };
         /**
          * ParameterValue
-         * @description What the drive said last.
+         * @description Last reading of a parameter.
          */
         ParameterValue: {
             /**
@@ -9766,7 +9787,7 @@ export interface components {
         };
         /**
          * ParameterWrites
-         * @description Several new values, written in turn; a failure does not stop the rest.
+         * @description Several new values, written one after the other; a failure does not stop the rest.
          */
         ParameterWrites: {
             /** Values */
@@ -9776,7 +9797,7 @@ export interface components {
         };
         /**
          * PasswordChange
-         * @description The own password.
+         * @description Present and new password of one's own account.
          */
         PasswordChange: {
             /** Password */
@@ -9786,7 +9807,7 @@ export interface components {
         };
         /**
          * PastFaultInfo
-         * @description One fault that the drive remembers, with what it froze.
+         * @description One fault in the drive's record, with the values frozen with it.
          */
         PastFaultInfo: {
             /** Causes */
@@ -9825,7 +9846,7 @@ export interface components {
         };
         /**
          * PendingRestoreValue
-         * @description A parameter that a motion changed and could not restore, as the link was lost.
+         * @description A parameter that a motion temporarily changed and could not restore, because the link was lost.
          */
         PendingRestoreValue: {
             /** Key */
@@ -9845,7 +9866,7 @@ export interface components {
         };
         /**
          * PeopleHere
-         * @description Who is connected, and what guests may do. ``rights`` are those of this connection now.
+         * @description People who are connected, and invitations. ``rights`` are those of this connection now.
          */
         PeopleHere: {
             /** Invitations */
@@ -9863,7 +9884,7 @@ export interface components {
         };
         /**
          * PeopleList
-         * @description Who is connected.
+         * @description People who are connected.
          */
         PeopleList: {
             /** People */
@@ -9871,7 +9892,7 @@ export interface components {
         };
         /**
          * PersonHere
-         * @description Somebody whose page is open. ``holds`` are the axes that they control.
+         * @description A person whose page is open. ``holds`` are the axes that they control.
          */
         PersonHere: {
             /** Connection */
@@ -9907,19 +9928,18 @@ export interface components {
         };
         /**
          * PlainResult
-         * @description What a job that is no tool concludes: a scan, reading all parameters, loading a set.
+         * @description Result of a job that is not a tool: a scan, reading all parameters, writing a set.
          */
         PlainResult: {
             [key: string]: unknown;
         };
         /**
          * PlotCursor
-         * @description Where on a plot this person points, in what its axis shows; null when they do not.
+         * @description Position at which this person points on a plot; null if they do not point.
          *
-         *     On the scope, its spectrogram and its X-Y plot that is the time of the samples (``t0_s``),
-         *     which is the same on every page whatever each of them shows and counts as zero; elsewhere the
-         *     frequency in Hz or the time in s. ``y`` is the frequency in Hz where the spectrogram is pointed
-         *     at, else null.
+         *     On the scope, its spectrogram and its X-Y plot ``x`` is the time of the samples (``t0_s``),
+         *     which is the same on every page regardless of its zero and range; elsewhere it is the frequency
+         *     [Hz] or the time [s]. ``y`` is the frequency [Hz] on the spectrogram, otherwise null.
          */
         PlotCursor: {
             /**
@@ -9943,7 +9963,7 @@ export interface components {
         };
         /**
          * Pointer
-         * @description Where this person points on their page; null when they do not.
+         * @description Position at which this person points on their page; null if they do not point.
          */
         Pointer: {
             /**
@@ -9959,7 +9979,7 @@ export interface components {
         };
         /**
          * PointerMoved
-         * @description Somebody else's pointer.
+         * @description Pointer of another person.
          */
         PointerMoved: {
             /** Connection */
@@ -9995,7 +10015,7 @@ export interface components {
         };
         /**
          * PortInfo
-         * @description One connection of a drive.
+         * @description One connection of a drive to a bus.
          */
         PortInfo: {
             /** Kind */
@@ -10011,7 +10031,7 @@ export interface components {
         };
         /**
          * PortRequest
-         * @description A further port of a drive that is already connected.
+         * @description An additional port of a drive that is already connected.
          */
         PortRequest: {
             /**
@@ -10027,7 +10047,7 @@ export interface components {
         };
         /**
          * PredictRequest
-         * @description Notches and gains on a stored frequency response of the mechanics.
+         * @description Notches and gains to predict on a stored frequency response of the mechanics.
          */
         PredictRequest: {
             gains: components["schemas"]["GainValues"];
@@ -10038,7 +10058,7 @@ export interface components {
         };
         /**
          * PredictionInfo
-         * @description Predicted speed loop: curves over ``frequency_hz`` and the step of its reference.
+         * @description Predicted speed loop: curves over ``frequency_hz`` and the step response to its reference.
          */
         PredictionInfo: {
             /** Closed Db */
@@ -10064,7 +10084,7 @@ export interface components {
         };
         /**
          * PreflightFinding
-         * @description What hinders, the one whose removal would help most first.
+         * @description An obstacle to punctual cycles; listed in the order of their effect, largest first.
          */
         PreflightFinding: {
             code: components["schemas"]["Code"];
@@ -10089,7 +10109,7 @@ export interface components {
         };
         /**
          * PreflightInfo
-         * @description The computer now, with the last measurement of this interface.
+         * @description State of the computer now, with the last measurement of this interface.
          */
         PreflightInfo: {
             /**
@@ -10116,7 +10136,9 @@ export interface components {
         };
         /**
          * PreflightRequest
-         * @description A measurement. Frames that read one register of all slaves go to ``interface``.
+         * @description Settings of a measurement.
+         *
+         *     Frames that read one register of all slaves are sent to ``interface``.
          */
         PreflightRequest: {
             /**
@@ -10133,7 +10155,9 @@ export interface components {
         };
         /**
          * PreflightRun
-         * @description One measured cycle. ``edges_us`` are the upper ends of the classes; one more lies above.
+         * @description Timing measured at one cycle time.
+         *
+         *     ``edges_us`` are the upper limits of the classes; one more class is above them.
          */
         PreflightRun: {
             /** Cycles */
@@ -10167,7 +10191,7 @@ export interface components {
         };
         /**
          * PreflightUndone
-         * @description What was restored, and what somebody had changed since and so was left.
+         * @description Settings that were restored, and those left because somebody has changed them since.
          */
         PreflightUndone: {
             /** Left */
@@ -10177,7 +10201,7 @@ export interface components {
         };
         /**
          * PreflightVerdict
-         * @description Whether a purpose can be served, and the figures it rests on.
+         * @description Suitability of the computer for a purpose, and the figures that it rests on.
          */
         PreflightVerdict: {
             /** Allowed */
@@ -10238,7 +10262,7 @@ export interface components {
         };
         /**
          * Problem
-         * @description RFC 9457 problem details, with what a person needs to act.
+         * @description RFC 9457 problem details, with the facts that a person needs to act.
          */
         Problem: {
             /**
@@ -10290,7 +10314,7 @@ export interface components {
         };
         /**
          * ProcedureInfo
-         * @description A named sequence of the profile.
+         * @description A procedure of the profile: a named sequence of steps.
          */
         ProcedureInfo: {
             /**
@@ -10333,7 +10357,7 @@ export interface components {
         };
         /**
          * ProfileInfo
-         * @description A profile that servodeck brings, or one of the user's own.
+         * @description A profile of servodeck, or one of the user's own.
          */
         ProfileInfo: {
             /** Links */
@@ -10365,7 +10389,7 @@ export interface components {
         };
         /**
          * ProfileMatch
-         * @description A profile that fits what was found, and how sure that is.
+         * @description A profile that matches a found drive, and how certain that is.
          */
         ProfileMatch: {
             /**
@@ -10404,7 +10428,7 @@ export interface components {
         };
         /**
          * Pulse
-         * @description One pulse of torque and where the shaft stood before and after it, from the start.
+         * @description One torque pulse and the position before and after it, from the start.
          */
         Pulse: {
             /**
@@ -10421,7 +10445,7 @@ export interface components {
         };
         /**
          * Purpose
-         * @description What somebody wants to do, and at which cycle.
+         * @description Purpose for which the computer is judged, with its cycle.
          * @enum {string}
          */
         Purpose: "parameters" | "scope_1khz" | "response_1khz" | "response_4khz";
@@ -10459,7 +10483,7 @@ export interface components {
         };
         /**
          * Quantity
-         * @description What is scaled.
+         * @description The quantity that a scale converts.
          * @enum {string}
          */
         Quantity: "position" | "velocity" | "acceleration";
@@ -10473,7 +10497,7 @@ export interface components {
         };
         /**
          * ReadDictionaryRequest
-         * @description Make a profile from what a drive reports of its own objects.
+         * @description Make a profile from the object dictionary of a drive.
          */
         ReadDictionaryRequest: {
             /** Profile */
@@ -10485,7 +10509,7 @@ export interface components {
         };
         /**
          * RealisedInfo
-         * @description What the drive really does after rounding; null where it cannot be said.
+         * @description Notch that the drive realises after rounding; null where it is not determined.
          */
         RealisedInfo: {
             /** Center Hz */
@@ -10511,7 +10535,9 @@ export interface components {
         };
         /**
          * RecordTrigger
-         * @description When a recording begins. ``rising``, ``falling`` and ``change`` look at a recorded signal.
+         * @description Condition for a recording to begin.
+         *
+         *     ``rising``, ``falling`` and ``change`` refer to a recorded signal.
          */
         RecordTrigger: {
             /**
@@ -10543,7 +10569,7 @@ export interface components {
         };
         /**
          * RecordedAxis
-         * @description An axis as it was when the recording began.
+         * @description An axis at the start of the recording.
          */
         RecordedAxis: {
             /** Drive */
@@ -10594,7 +10620,7 @@ export interface components {
         };
         /**
          * RecordedParameter
-         * @description A setting at the start of a recording.
+         * @description A parameter value at the start of a recording.
          */
         RecordedParameter: {
             /** Error */
@@ -10614,7 +10640,7 @@ export interface components {
         };
         /**
          * RecordedSamples
-         * @description Samples of a stretch of a recording, every one as it was recorded.
+         * @description All samples of one section of a recording, without decimation.
          */
         RecordedSamples: {
             /** From S */
@@ -10703,7 +10729,7 @@ export interface components {
         };
         /**
          * RecordingDetail
-         * @description A recording with its events and the settings of its axes.
+         * @description A recording with its events and the parameter values of its axes.
          */
         RecordingDetail: {
             /** Events */
@@ -10716,7 +10742,7 @@ export interface components {
         };
         /**
          * RecordingEvent
-         * @description Something that happened during a recording; seconds since its first sample.
+         * @description An event during a recording; ``t_s`` counts from its first sample.
          */
         RecordingEvent: {
             /** Drive */
@@ -10732,7 +10758,7 @@ export interface components {
         };
         /**
          * RecordingInfo
-         * @description A recording of the list, running or stored.
+         * @description A running or stored recording.
          */
         RecordingInfo: {
             /** Axes */
@@ -10784,7 +10810,7 @@ export interface components {
         };
         /**
          * RecordingList
-         * @description Recordings, newest first, and the room that is left.
+         * @description Recordings, newest first, and the free space.
          */
         RecordingList: {
             /** Free Bytes */
@@ -10800,7 +10826,7 @@ export interface components {
         };
         /**
          * RecordingPreview
-         * @description The table that a file holds.
+         * @description Table contained in a file.
          */
         RecordingPreview: {
             /** Columns */
@@ -10897,7 +10923,7 @@ export interface components {
         };
         /**
          * ReportRequest
-         * @description What goes into the report of an axis.
+         * @description Contents of the report of an axis.
          */
         ReportRequest: {
             /**
@@ -10935,7 +10961,7 @@ export interface components {
         };
         /**
          * ResistorModel
-         * @description What a manual's table says of braking with one model; None where it prints nothing.
+         * @description Braking data of one model in the manual's table; None where it prints nothing.
          */
         ResistorModel: {
             /**
@@ -10959,7 +10985,7 @@ export interface components {
         };
         /**
          * ResonanceInfo
-         * @description A row of the table of resonances; ``height_db`` is how far it rises or falls there.
+         * @description A row of the table of resonances; ``height_db`` is the rise or fall of the response there.
          */
         ResonanceInfo: {
             /** Damping */
@@ -10986,7 +11012,7 @@ export interface components {
         };
         /**
          * RetentionBounds
-         * @description When the oldest recordings are deleted; null: never.
+         * @description Limits above which the oldest recordings are deleted; null: no limit.
          */
         RetentionBounds: {
             /** Keep Days */
@@ -10996,22 +11022,22 @@ export interface components {
         };
         /**
          * Right
-         * @description What somebody may do on this station.
+         * @description A permission on this station.
          * @enum {string}
          */
         Right: "look" | "files" | "parameters" | "measure" | "motion" | "station" | "invite" | "administer";
         /**
          * Role
-         * @description What somebody is on this station.
+         * @description Role of a person on this station.
          * @enum {string}
          */
         Role: "viewer" | "operator" | "administrator" | "guest";
         /**
          * SafetyResult
-         * @description Times are in ms from the first sign on the bus, ways in revolutions of the motor.
+         * @description Times are in ms from the first sign on the bus, distances in revolutions of the motor.
          *
-         *     No time includes what passed from the person's hand to that sign: contacts, the safety relay
-         *     and the drive's own input are not on the bus. ``torque`` is what the drive says of itself, in %
+         *     No time includes the delay from the person's hand to that sign: contacts, the safety relay and
+         *     the drive's own input are not on the bus. ``torque`` values are as the drive reports them, in %
          *     of the motor's rated torque. ``measured_at`` is ISO 8601, UTC.
          */
         SafetyResult: {
@@ -11128,9 +11154,9 @@ export interface components {
         };
         /**
          * SafetySettings
-         * @description One function at a time: after a person has stopped the axis, nothing moves it by itself.
+         * @description Settings for one function: after a person has stopped the axis, nothing moves it by itself.
          *
-         *     Limits that are None are not judged, only recorded.
+         *     Limits that are None are not judged; the values are only recorded.
          */
         SafetySettings: {
             /**
@@ -11243,7 +11269,7 @@ export interface components {
         };
         /**
          * SaveSetRequest
-         * @description Store the present values of a drive.
+         * @description Store the current values of a drive.
          */
         SaveSetRequest: {
             /**
@@ -11345,7 +11371,7 @@ export interface components {
         };
         /**
          * ScalesUpdate
-         * @description Scales from a data sheet; what is left out stays as it was taught before.
+         * @description Scales from a data sheet; values that are left out stay as they were stated before.
          */
         ScalesUpdate: {
             /** Counts Per Rev */
@@ -11375,7 +11401,7 @@ export interface components {
         };
         /**
          * ScopeChannel
-         * @description One trace.
+         * @description One channel of a scope subscription.
          */
         ScopeChannel: {
             /** Drive */
@@ -11385,7 +11411,7 @@ export interface components {
         };
         /**
          * ScopeChannelInfo
-         * @description Name, unit and timing of one trace.
+         * @description Name, unit and timing of one channel.
          */
         ScopeChannelInfo: {
             /**
@@ -11419,7 +11445,7 @@ export interface components {
         };
         /**
          * ScopeInfo
-         * @description How a subscription's channels are sampled; again whenever that changes.
+         * @description How a subscription's channels are sampled; sent again whenever that changes.
          */
         ScopeInfo: {
             /** Channels */
@@ -11437,7 +11463,7 @@ export interface components {
         };
         /**
          * ScopeMath
-         * @description A computed channel over the shown values of others (docs/scope.md has the language).
+         * @description A channel computed from the displayed values of others (language: docs/scope.md).
          */
         ScopeMath: {
             /** Expression */
@@ -11454,7 +11480,7 @@ export interface components {
         };
         /**
          * ScopeRange
-         * @description A fixed y scale for the traces of one unit; without one they fill the plot.
+         * @description A fixed y scale for the traces of one unit; without one, they are scaled to the plot.
          */
         ScopeRange: {
             /** High */
@@ -11466,7 +11492,7 @@ export interface components {
         };
         /**
          * ScopeSetup
-         * @description Everything that is set on the Scope page.
+         * @description All settings of the Scope page.
          */
         ScopeSetup: {
             /**
@@ -11544,8 +11570,10 @@ export interface components {
         };
         /**
          * ScopeTrace
-         * @description A channel that is shown. ``show``: the drive's own unit, the axis' unit, or one's own,
-         *     which is (drive's value × ``factor`` + ``offset``) in ``unit``.
+         * @description A channel that is displayed.
+         *
+         *     ``show`` selects the drive's unit, the axis' unit, or ``own``: drive's value × ``factor`` +
+         *     ``offset``, in ``unit``.
          */
         ScopeTrace: {
             /** Drive */
@@ -11578,8 +11606,10 @@ export interface components {
         };
         /**
          * ScopeTrigger
-         * @description When the picture is taken. ``drive`` is for ``fault`` and ``motion``, ``trace`` for all
-         *     other kinds; ``before`` is the part of the window before the trigger.
+         * @description Trigger of the scope.
+         *
+         *     ``drive`` is for the kinds ``fault`` and ``motion``, ``trace`` for all others; ``before`` is the
+         *     fraction of the window before the trigger.
          */
         ScopeTrigger: {
             /**
@@ -11680,7 +11710,7 @@ export interface components {
         };
         /**
          * SegmentHandoverRequest
-         * @description The values of several drives on one bus, as one list.
+         * @description Export of the values of several drives on one bus, as one list.
          */
         SegmentHandoverRequest: {
             /**
@@ -11723,7 +11753,7 @@ export interface components {
         };
         /**
          * SegmentPort
-         * @description One port of a slave. Counters stop at 255 and count since they were last cleared.
+         * @description One port of a slave. Counters saturate at 255 and count since they were last cleared.
          */
         SegmentPort: {
             /** Communicating */
@@ -11748,7 +11778,7 @@ export interface components {
         };
         /**
          * SegmentStation
-         * @description One slave in the order of the cable.
+         * @description One slave; slaves are listed in the order of the cable.
          */
         SegmentStation: {
             /** Alias */
@@ -11827,7 +11857,7 @@ export interface components {
         };
         /**
          * SequenceRequest
-         * @description Back and forth between two positions.
+         * @description Reciprocating move between two positions.
          */
         SequenceRequest: {
             /** Acceleration */
@@ -11886,7 +11916,7 @@ export interface components {
         };
         /**
          * Session
-         * @description Who is asking, and what they may do. ``csrf`` goes into a header of every change.
+         * @description The person of this session and their rights. ``csrf`` is sent in a header of every change.
          */
         Session: {
             /** Csrf */
@@ -11907,7 +11937,7 @@ export interface components {
         };
         /**
          * SessionInfo
-         * @description A log-in that is still valid.
+         * @description A log-in session that is still valid.
          */
         SessionInfo: {
             /** Client */
@@ -11936,7 +11966,7 @@ export interface components {
         };
         /**
          * SetUp
-         * @description The first administrator; ``code`` is in the terminal of the machine.
+         * @description The first administrator; ``code`` is the set-up code in the terminal of the machine.
          */
         SetUp: {
             /** Code */
@@ -11960,8 +11990,8 @@ export interface components {
          * ShapingComparison
          * @description The same move without and with the shaper.
          *
-         *     Settling counts from the end of the unshaped setpoints in both, so that it contains the delay
-         *     of the shaper; null: not settled at the end of the recording.
+         *     Settling counts from the end of the unshaped setpoints in both, so that it includes the delay of
+         *     the shaper; null: not settled at the end of the recording.
          */
         ShapingComparison: {
             /** Moves */
@@ -12013,7 +12043,7 @@ export interface components {
         };
         /**
          * ShapingDriveValue
-         * @description A parameter of the drive's own filter, and the value that it would take.
+         * @description A parameter of the drive's own filter, and its value for the mode.
          */
         ShapingDriveValue: {
             /** Name */
@@ -12029,7 +12059,7 @@ export interface components {
         };
         /**
          * ShapingFinding
-         * @description What limits the answer, or where the shaper belongs.
+         * @description Something that limits the validity of the result, or where to implement the shaper.
          */
         ShapingFinding: {
             /**
@@ -12089,7 +12119,7 @@ export interface components {
         };
         /**
          * ShapingResidual
-         * @description Half of peak to peak in the period after the shaped move, of one signal.
+         * @description Half the peak-to-peak value of one signal in the period after the shaped move.
          */
         ShapingResidual: {
             /** Shaped */
@@ -12109,7 +12139,7 @@ export interface components {
         };
         /**
          * ShapingResult
-         * @description ``signal`` is the one that shows the mode best; traces are of it, about what creeps.
+         * @description Result; ``signal`` shows the mode best, and the traces are of it, without its slow creep.
          */
         ShapingResult: {
             /** Chosen */
@@ -12167,7 +12197,7 @@ export interface components {
         };
         /**
          * ShapingSettings
-         * @description A move out and back, repeated, without a shaper and then with one.
+         * @description A move out and back, repeated, first without and then with a shaper.
          */
         ShapingSettings: {
             /**
@@ -12287,7 +12317,7 @@ export interface components {
         };
         /**
          * Signature
-         * @description Who signed the record, when. ``intact``: the signed contents have the same checksum now.
+         * @description Who signed the record, and when. ``intact``: the signed contents still have this checksum.
          */
         Signature: {
             /** Intact */
@@ -12306,7 +12336,7 @@ export interface components {
         };
         /**
          * SignatureRequest
-         * @description Who signs a record where nobody is logged in by name, and what is to be known of it.
+         * @description Person who signs a record where nobody is logged in by name, and notes.
          */
         SignatureRequest: {
             /**
@@ -12341,7 +12371,7 @@ export interface components {
         };
         /**
          * SmallMovesInfo
-         * @description Small moves by increments since this axis is connected.
+         * @description Small moves by increments since this axis was connected.
          */
         SmallMovesInfo: {
             /**
@@ -12362,7 +12392,7 @@ export interface components {
         };
         /**
          * SnapshotHeader
-         * @description Head of a snapshot file. ``origin_s`` is the time that was shown as zero.
+         * @description Header of a snapshot file. ``origin_s`` is the time that was displayed as zero.
          */
         SnapshotHeader: {
             /**
@@ -12383,7 +12413,7 @@ export interface components {
         };
         /**
          * SnapshotInfo
-         * @description A snapshot of the list; ``header`` is null where the file is not usable.
+         * @description A stored snapshot; ``header`` is null if the file is not usable.
          */
         SnapshotInfo: {
             /** Bytes */
@@ -12422,7 +12452,7 @@ export interface components {
         };
         /**
          * StartRecording
-         * @description What to record.
+         * @description Settings of a recording.
          */
         StartRecording: {
             /** Channels */
@@ -12442,7 +12472,7 @@ export interface components {
             notes: string;
             /**
              * Period S
-             * @description polled signals; 0: as fast as
+             * @description of polled signals; 0: as fast as the bus allows
              * @default 0
              */
             period_s: number;
@@ -12461,7 +12491,7 @@ export interface components {
         };
         /**
          * StateChanged
-         * @description Axis state, at 10 Hz at most.
+         * @description State of an axis, at 10 Hz at most.
          */
         StateChanged: {
             state: components["schemas"]["AxisState"];
@@ -12474,7 +12504,7 @@ export interface components {
         };
         /**
          * StationDiagnosis
-         * @description One station; without causes where it is in Operational.
+         * @description Diagnosis of one station; without causes if it is in Operational.
          */
         StationDiagnosis: {
             /** Causes */
@@ -12483,8 +12513,6 @@ export interface components {
             kept?: components["schemas"]["DoctorTrial"] | null;
             /** Reached */
             reached: boolean;
-            /** Refusal */
-            refusal?: string | null;
             /** Station */
             station: number;
             /**
@@ -12495,7 +12523,7 @@ export interface components {
         };
         /**
          * StepAnswer
-         * @description Curves [n] over ``time_s``, and what is read from them.
+         * @description Curves [n] over ``time_s``, and the figures read from them.
          */
         StepAnswer: {
             /** Actual */
@@ -12555,7 +12583,7 @@ export interface components {
         };
         /**
          * StepNumbers
-         * @description Read-outs of a step of speed; times from the command, None where it was never reached.
+         * @description Figures of a speed step; times from the command, None where never reached.
          */
         StepNumbers: {
             /** Final */
@@ -12573,7 +12601,7 @@ export interface components {
         };
         /**
          * StepRequest
-         * @description A step of speed (rpm) or a move (rev).
+         * @description Settings of a step of speed (rpm) or a move (rev).
          */
         StepRequest: {
             /**
@@ -12683,7 +12711,7 @@ export interface components {
         };
         /**
          * StopRequest
-         * @description STOP; all drives where none is named.
+         * @description STOP of one drive; of all drives if none is named.
          */
         StopRequest: {
             /** Drive */
@@ -12691,7 +12719,7 @@ export interface components {
         };
         /**
          * StopResult
-         * @description What STOP reached.
+         * @description Result of STOP.
          */
         StopResult: {
             /**
@@ -12721,7 +12749,7 @@ export interface components {
         };
         /**
          * StopStepInfo
-         * @description One thing that STOP did, or tried in vain.
+         * @description One action of STOP, successful or not.
          */
         StopStepInfo: {
             /**
@@ -12752,7 +12780,7 @@ export interface components {
         };
         /**
          * StopTaken
-         * @description STOP has sent its quick stop; what it reached follows as ``stop_result``.
+         * @description STOP has sent its quick stop; its verdict follows as ``stop_result``.
          */
         StopTaken: {
             /** Drives */
@@ -12824,10 +12852,10 @@ export interface components {
         };
         /**
          * SweepAnswer
-         * @description The response [lines] with its deviations, and what is read from it.
+         * @description The response [lines] with its deviations, and the figures read from it.
          *
-         *     ``coherence`` and the deviations are next to each line; None where nothing is known of them.
-         *     ``margins`` hold from ``from_hz`` to ``to_hz``, each None where no crossing was measured.
+         *     ``coherence`` and the deviations are given for each line; None where unknown. ``margins`` are
+         *     valid from ``from_hz`` to ``to_hz``, each None where no crossover was measured.
          */
         SweepAnswer: {
             /** Coherence */
@@ -12920,7 +12948,7 @@ export interface components {
         };
         /**
          * SweepRequest
-         * @description Frequency response.
+         * @description Settings of a frequency response.
          */
         SweepRequest: {
             /**
@@ -13045,7 +13073,7 @@ export interface components {
         };
         /**
          * TerminalFacts
-         * @description States, polarities and overruling of the terminals.
+         * @description States, polarities and overriding of the terminals.
          */
         TerminalFacts: {
             /**
@@ -13090,7 +13118,7 @@ export interface components {
         };
         /**
          * TerminalFunction
-         * @description A function that a terminal can be given.
+         * @description A function that can be assigned to a terminal.
          */
         TerminalFunction: {
             /** Code */
@@ -13102,7 +13130,7 @@ export interface components {
         };
         /**
          * TerminalInfo
-         * @description One terminal: what it is at, and what it is for.
+         * @description One terminal: its state and its function.
          */
         TerminalInfo: {
             /**
@@ -13143,7 +13171,7 @@ export interface components {
         };
         /**
          * ThreeWay
-         * @description Two sets against a drive, read now.
+         * @description Two sets compared with a drive that was read now.
          */
         ThreeWay: {
             /** Base */
@@ -13245,7 +13273,7 @@ export interface components {
         };
         /**
          * ToolInfo
-         * @description A tool as its descriptor has it.
+         * @description Descriptor of a tool.
          */
         ToolInfo: {
             /** Kind */
@@ -13307,7 +13335,7 @@ export interface components {
         };
         /**
          * TrialRequest
-         * @description One of the trials that the last examination of this station has offered.
+         * @description One of the trials offered by the last examination of this station.
          */
         TrialRequest: {
             /** After */
@@ -13321,7 +13349,7 @@ export interface components {
         };
         /**
          * TrialResult
-         * @description Result of a trial's job. The setting is undone again.
+         * @description Result of a trial's job. The setting has been undone.
          */
         TrialResult: {
             /** After */
@@ -13340,7 +13368,7 @@ export interface components {
         };
         /**
          * TurnedUpdate
-         * @description How far the shaft turned in the last small move, as a person saw it.
+         * @description Rotation of the shaft in the last small move, as observed by a person.
          */
         TurnedUpdate: {
             /** Turned Rev */
@@ -13348,7 +13376,7 @@ export interface components {
         };
         /**
          * TurningInfo
-         * @description An axis that turns although nobody may move it.
+         * @description An axis that moves although no motion is permitted.
          */
         TurningInfo: {
             /**
@@ -13370,10 +13398,10 @@ export interface components {
         Uncertainty: "no_resolution" | "feed_of_one" | "unit_and_feed" | "linear" | "not_stated" | "unreadable" | "behind_gear" | "needs_resolution" | "factor";
         /**
          * Undo
-         * @description Raw values that were there before; writing them back undoes the change.
+         * @description Raw values before a change; writing them back undoes it.
          *
-         *     ``after`` is what the change left: where it is given and something else is there now, nothing
-         *     is undone, as somebody has changed it since.
+         *     ``after`` are the values that the change left: if they are given and the drive has other ones
+         *     now, nothing is undone, as somebody has changed them since.
          */
         Undo: {
             /** After */
@@ -13387,7 +13415,7 @@ export interface components {
         };
         /**
          * ValuesChanged
-         * @description New readings; also sent to everybody when anybody writes.
+         * @description New readings; also sent to all pages when a parameter is written.
          */
         ValuesChanged: {
             /** Drive */
@@ -13403,7 +13431,7 @@ export interface components {
         };
         /**
          * VerdictInfo
-         * @description What is known of the tuned loop: measured over a band, predicted beyond it.
+         * @description Verification of the tuned loop: measured over a band, predicted beyond it.
          */
         VerdictInfo: {
             /** Contradicted */
@@ -13429,7 +13457,7 @@ export interface components {
         };
         /**
          * VerifiedInfo
-         * @description The tuned loop as it was measured.
+         * @description Measurement and verdict of the tuned loop.
          */
         VerifiedInfo: {
             expected: components["schemas"]["FiguresInfo"] | null;
@@ -13443,7 +13471,7 @@ export interface components {
         };
         /**
          * VersionInfo
-         * @description One state of an entry; never changed.
+         * @description One version of an entry; never changed.
          */
         VersionInfo: {
             /** Author */
@@ -13477,7 +13505,7 @@ export interface components {
         };
         /**
          * VibrationFinding
-         * @description What the map states, or cannot state, as a code with the figure that it rests on.
+         * @description A result or limitation of the map: a code and the figure that it rests on.
          */
         VibrationFinding: {
             /**
@@ -13561,7 +13589,7 @@ export interface components {
         };
         /**
          * VibrationPart
-         * @description One sinusoid of the speed at one speed; amplitudes.
+         * @description One sinusoid at one speed: amplitudes of speed and torque.
          */
         VibrationPart: {
             /** Frequency Hz */
@@ -13575,7 +13603,7 @@ export interface components {
         };
         /**
          * VibrationResonance
-         * @description A mode of the axis with its loops as they are, excited where order · speed meets it.
+         * @description A mode of the axis with its present loops, excited where order · speed matches it.
          */
         VibrationResonance: {
             /**
@@ -13598,7 +13626,7 @@ export interface components {
         };
         /**
          * VibrationResult
-         * @description The map. What lies above ``band_hz`` is folded by the sampling and is not stated.
+         * @description The map. Frequencies above ``band_hz`` are aliased by the sampling and are not stated.
          */
         VibrationResult: {
             /** Band Hz */
@@ -13646,7 +13674,7 @@ export interface components {
         };
         /**
          * VibrationSettings
-         * @description Speeds of the map; the time limit is that of all moves together.
+         * @description Speeds of the map; the time limit applies to all moves together.
          */
         VibrationSettings: {
             /**
@@ -13707,7 +13735,7 @@ export interface components {
         };
         /**
          * VibrationSpeed
-         * @description One constant speed; negative speeds turn backwards. RMS about the mean and a slow drift.
+         * @description One constant speed, negative backwards. RMS about the mean and a slow drift.
          */
         VibrationSpeed: {
             /**
@@ -13749,7 +13777,7 @@ export interface components {
         };
         /**
          * WatchUpdate
-         * @description The watch list of an axis, in order.
+         * @description Watch list of an axis, in order.
          */
         WatchUpdate: {
             /** Keys */
@@ -13778,7 +13806,7 @@ export interface components {
         };
         /**
          * Where
-         * @description The page that this person looks at, as in the address after the #.
+         * @description The page that this person views, as in the address after the #.
          */
         Where: {
             /** Page */
@@ -13804,7 +13832,7 @@ export interface components {
         };
         /**
          * Finding
-         * @description What limits the answer, or what to do about it.
+         * @description Something that limits the validity of the result, or a recommended action.
          */
         backend__tools__cycle__result__Finding: {
             /**
@@ -13822,7 +13850,7 @@ export interface components {
         };
         /**
          * Finding
-         * @description What the map says, or cannot say, as a code with the figure that it rests on.
+         * @description A result or limitation of the map: a code and the figure that it rests on.
          */
         backend__tools__friction__result__Finding: {
             /**
@@ -13841,7 +13869,7 @@ export interface components {
         };
         /**
          * Finding
-         * @description What the measurement shows, or cannot show, as a code with the figure that it rests on.
+         * @description A result or limitation of the measurement: a code and the figure that it rests on.
          */
         backend__tools__load_side__result__Finding: {
             /**
@@ -33914,7 +33942,7 @@ export interface operations {
                 serial?: number | null;
                 since?: string | null;
                 until?: string | null;
-                /** @description only what was put aside */
+                /** @description only deleted entries */
                 deleted?: boolean;
                 limit?: number;
                 offset?: number;
