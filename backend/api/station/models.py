@@ -197,7 +197,7 @@ class Lease(Message):
 
 
 class PendingRestoreValue(Message):
-    """A parameter that a motion temporarily changed and could not restore, because the link was lost."""
+    """A parameter that a motion changed temporarily and could not restore: the link was lost."""
 
     key: str
     name: str

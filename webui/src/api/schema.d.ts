@@ -9846,7 +9846,7 @@ export interface components {
         };
         /**
          * PendingRestoreValue
-         * @description A parameter that a motion temporarily changed and could not restore, because the link was lost.
+         * @description A parameter that a motion changed temporarily and could not restore: the link was lost.
          */
         PendingRestoreValue: {
             /** Key */
