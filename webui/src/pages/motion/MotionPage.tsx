@@ -6,6 +6,7 @@ import { setState, useAxisState, useDrive, useJob } from '../../live/store'
 import { JobNote } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { StateName } from '../../widgets/StateName'
 import { useAction } from '../../widgets/useAction'
 import { Blocked, Quantities } from '../overview/OverviewPage'
 import { HomingPanel } from './HomingPanel'
@@ -80,7 +81,7 @@ export function MotionPage({ drive }: { drive: string }) {
         <Panel title={t('overview.now')}>
           <Quantities drive={drive} state={state} />
           <p>
-            {t('motion.state')} <strong>{state ? known(t, 'state', state.state) : '—'}</strong> ·{' '}
+            {t('motion.state')} <strong>{state ? <StateName state={state.state} /> : '—'}</strong> ·{' '}
             {state && known(t, 'mode', state.mode_name)}
           </p>
           <Power drive={drive} />

@@ -1,6 +1,7 @@
 import { stateLook, stateSign } from '../../app/states'
-import { known, useLanguage, useT } from '../../i18n'
+import { useT } from '../../i18n'
 import { useAxisStates, useDrives } from '../../live/store'
+import { StateName } from '../../widgets/StateName'
 
 /**
  * The states of the axes over the scene, in the page's language: viser has one label for all who
@@ -9,23 +10,20 @@ import { useAxisStates, useDrives } from '../../live/store'
  */
 export function SceneStates({ axis }: { axis?: string }) {
   const t = useT()
-  // The manuals print the states in English: a translation stands with the original.
-  const both = useLanguage() !== 'en'
   const drives = (useDrives() ?? []).filter((each) => axis === undefined || each.id === axis)
   const states = useAxisStates(drives.map((each) => each.id))
   return (
     <ul className="scene-states" aria-label={t('scene.states')}>
       {drives.map((drive, place) => {
         const state = states[place] ?? null
-        const words = !state
-          ? t('state.unknown')
-          : !state.fresh
-            ? t('state.noAnswer')
-            : known(t, 'state', state.state)
         return (
           <li key={drive.id} data-drive={drive.id} className={stateLook(state).tone}>
-            {`${drive.name} [${stateSign(state)}] ${words}`}
-            {both && state?.fresh && <span lang="en">{`（${state.state}）`}</span>}
+            {`${drive.name} [${stateSign(state)}] `}
+            {state?.fresh ? (
+              <StateName state={state.state} />
+            ) : (
+              t(state ? 'state.noAnswer' : 'state.unknown')
+            )}
           </li>
         )
       })}
