@@ -112,19 +112,20 @@ class SpeedWatch:
         """Whether the last sample showed motion, or was not sufficient to exclude it."""
         return self._still_since is None
 
-    def stayed_since(self, before: Sample) -> bool:
-        """Whether the last position equals that of ``before``, within the tolerance of a
-        standstill.
+    def at_place_of(self, before: Sample, now: Sample) -> bool:
+        """Whether both positions agree within the travel of a standing axis, and 606Ch is low.
 
-        For samples far apart this is weak evidence: an axis that oscillates, or has just begun to
-        move, is near its old position too.
+        The travel allowed is that of the speed limit, of `WINDOW_S` at most however old ``before``
+        is: an axis that swings comes back to its old place.
         """
-        now = self.newest
-        if now is None or now.position is None or before.position is None:
+        if now.position is None or before.position is None:
             return False
         counts = None if self.units is None else self.units.counts_per_rev
-        most = _STILL_INC if counts is None else STANDS_BY_POSITION_RPM / 60 * WINDOW_S * counts
-        return abs(_difference(now.position, before.position)) <= most
+        span_s = min(now.at_s - before.at_s, WINDOW_S)
+        most = _STILL_INC if counts is None else STANDS_BY_POSITION_RPM / 60 * span_s * counts
+        limit = STANDS_BY_SPEED_RPM if self.certain else _STILL_RAW
+        slow = (self._by_velocity(now) or 0.0) <= limit
+        return slow and abs(_difference(now.position, before.position)) <= most
 
     def stands(self, dwell_s: float = DWELL_S) -> bool:
         """Whether both speeds have been below their limits for this time."""
