@@ -11,6 +11,7 @@ from drivers.adapters import require_channel, serial_device
 from drivers.canopen.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
+from drivers.texts.message import Text, text
 
 #: Errors that python-can and the manufacturers' libraries below it raise when an adapter is missing
 #: or fails. They have no narrower base: ctypes bindings raise TypeError, AttributeError, NameError
@@ -54,34 +55,30 @@ def _open(url: CanUrl) -> can.BusABC:
 
 def translate(url: CanUrl, error: BaseException) -> LinkLost:
     """Translate the adapter's error to LinkLost, with a remedy."""
-    code = _errno(error)
-    text = str(error)
+    why = _why(url, error)
     name = f"{url.interface} {url.channel}"
+    return LinkLost("canopen.adapter", drive=url.url, remedy=why.remedy(), name=name, why=why)
+
+
+def _why(url: CanUrl, error: BaseException) -> Text:
+    code, words = _errno(error), str(error)
     if code in (errno.EACCES, errno.EPERM):
-        why = "no permission"
-        remedy = f"add the user to the group that owns {url.channel} (often dialout), log in again"
-    elif code == errno.EBUSY:
-        why, remedy = "in use by another program", "close the other program"
-    elif code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or _path_is_missing(url):
-        why, remedy = "no such adapter", "plug it in, or check its name"
-    elif code == errno.ENETDOWN:
-        why = "the interface is down"
-        remedy = f"sudo ip link set {url.channel} up type can bitrate {url.bitrate}"
-    elif code == errno.ENOBUFS or isinstance(error, AdapterBlocked):
-        why = "nobody acknowledges: the send buffer is full"
-        remedy = "check wiring, termination and bit rate; at least one other node must be on"
-    elif code == errno.EAFNOSUPPORT or "AF_CAN" in text:
-        why = "this system's kernel has no SocketCAN"
-        remedy = "use an adapter with slcan firmware, or a kernel with CAN support"
-    elif isinstance(error, (can.CanInterfaceNotImplementedError, ImportError, NameError)):
-        why = f"its driver is not installed ({text})"
-        remedy = "install the adapter maker's driver, or use socketcan on Linux"
-    elif isinstance(error, AdapterLost):
-        why = text
-        remedy = "check its USB cable and plug it in again; it is opened by itself when it is back"
-    else:
-        why, remedy = text or type(error).__name__, "unplug it, plug it in, and check the wiring"
-    return LinkLost("canopen.adapter", drive=url.url, remedy=remedy, name=name, why=why)
+        return text("canopen.adapter-no-permission", channel=url.channel)
+    if code == errno.EBUSY:
+        return text("canopen.adapter-in-use")
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or _path_is_missing(url):
+        return text("canopen.adapter-missing")
+    if code == errno.ENETDOWN:
+        return text("canopen.adapter-down", channel=url.channel, bitrate=url.bitrate)
+    if code == errno.ENOBUFS or isinstance(error, AdapterBlocked):
+        return text("canopen.adapter-no-acknowledge")
+    if code == errno.EAFNOSUPPORT or "AF_CAN" in words:
+        return text("canopen.adapter-no-socketcan")
+    if isinstance(error, (can.CanInterfaceNotImplementedError, ImportError, NameError)):
+        return text("canopen.adapter-no-driver", cause=words)
+    if isinstance(error, AdapterLost):
+        return text("canopen.adapter-lost", cause=words)
+    return text("canopen.adapter-failed", cause=words or type(error).__name__)
 
 
 def _errno(error: BaseException | None) -> int | None:

@@ -22,11 +22,6 @@ T = TypeVar("T")
 Send = Callable[[bytes], None]
 """Sends one request frame; raises LinkLost."""
 
-_SILENT_REMEDY = (
-    "check that the drive is powered, its number and the bit rate, the wiring and the "
-    "termination (120 Ω at both ends)"
-)
-
 _PROBE = b"\x40\x00\x10\x00" + bytes(4)
 """Read 1000h, which every CANopen device has (CiA 301 clause 7.5.2.1)."""
 

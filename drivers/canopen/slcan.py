@@ -54,7 +54,7 @@ class SlcanBus(slcanBus):
                 line = self._buffered_line()
         except (OSError, serial.SerialException, TypeError) as error:
             # TypeError: pyserial reads a descriptor that another thread has closed.
-            raise AdapterLost(f"the adapter is gone: {error}") from error
+            raise AdapterLost(str(error)) from error
         if line == "\a":
             self._ask_for_flags()
         return line
@@ -67,7 +67,7 @@ class SlcanBus(slcanBus):
         except serial.SerialTimeoutException as error:
             raise AdapterBlocked("the adapter takes no more frames") from error
         except _GONE as error:
-            raise AdapterLost(f"the adapter is gone: {error}") from error
+            raise AdapterLost(str(error)) from error
 
     def _ask_for_flags(self) -> None:
         """Read the flags, at most twice a second: an adapter without F answers with BEL again."""
