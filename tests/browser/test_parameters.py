@@ -19,7 +19,7 @@ def test_scan_and_connect(laptop: Page, station: Station) -> None:
     page.get_by_label("Stop at the first drive found").uncheck()
     page.get_by_role("button", name="Scan").click()
     results = page.get_by_role("region", name="What was found")
-    expect(results.get_by_role("heading")).to_have_text("Found: 2")
+    expect(results.get_by_role("heading")).to_have_text("Drives found: 2")
     first = results.locator(".found").first
     expect(first).to_contain_text("Station 1")
     expect(first.get_by_label("Profile")).to_have_value("mms7")

@@ -58,7 +58,7 @@ def slave(page: Page, number: int, state: str) -> None:
 
 def start(page: Page) -> None:
     """Start the exchange; a machine that stalls for more than a watchdog is asked again."""
-    runs = page.get_by_text("Runs every 1000 µs")
+    runs = page.get_by_text("Running, cycle time 1000 µs")
     button = page.get_by_role("button", name="Start", exact=True)
     for _ in range(3):
         button.click()
@@ -145,6 +145,6 @@ def test_an_exchange_that_broke_off_comes_back_and_says_so(laptop: Page, axis: B
     expect(reported).to_be_visible(timeout=SLOW_MS)
     expect(page.get_by_role("button", name="Do not restore it")).to_be_visible()
     segment.command("refuse", slave=1, state="SAFEOP", code=None)
-    expect(page.get_by_text("Runs every 1000 µs")).to_be_visible(timeout=SLOW_MS)
+    expect(page.get_by_text("Running, cycle time 1000 µs")).to_be_visible(timeout=SLOW_MS)
     expect(reported).to_have_count(0)
     assert axis.state()["state"] != "Operation enabled"
