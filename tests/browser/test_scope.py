@@ -308,7 +308,7 @@ def test_a_text_that_is_no_expression_is_said_to_be_none(page: Page) -> None:
         ("c1 +", "ends too early"),
         ("fetch(c1)", "“fetch” is no function"),
         ("", "Write something"),
-        ("c1; c2", "“;” at place 3"),
+        ("c1; c2", "“;” at position 3"),
     ):
         page.get_by_label("Expression").fill(text)
         expect(page.get_by_text(words)).to_be_visible()
