@@ -1280,6 +1280,9 @@ class vibration_run:
     """[ratio] Origin: docs/vibration.md."""
     LEAST_RANGE = 0.6
     """[ratio] Origin: docs/vibration.md."""
+    LEAST_CLOSER = 3
+    """[count] Fewer further speeds show no shape of the level, unless fewer are asked for. Origin:
+    a peak needs a speed on either side."""
     # LONGEST_S, ENOUGH_S, SHORT_S: A plateau is no longer; one that is shorter is repeated; and no
     # speed is measured whose plateaus would be shorter still.
     LONGEST_S = 1.2

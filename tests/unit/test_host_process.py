@@ -14,6 +14,7 @@ import pytest
 from drivers.errors import LinkLost, LinkTimeout
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
+from drivers.ethercat.process.channel import ServerEnd, SocketServerEnd
 from drivers.ethercat.process.hostprocess import HostProcess
 
 
@@ -31,7 +32,7 @@ async def connected(process: HostProcess) -> socket.socket:
     ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 4096)
     ours.setblocking(False)
     theirs.setblocking(False)
-    process._socket = ours
+    process._channel = SocketServerEnd(ours)
     process._process = SimpleNamespace(returncode=None, pid=0)  # type: ignore[assignment]
     process._ready = asyncio.get_running_loop().create_future()
     process._ready.set_result(None)
@@ -62,8 +63,8 @@ async def test_a_halt_comes_whole_after_a_motion_that_was_cancelled_while_it_was
     halt.cancel()
     await asyncio.wait([halt])
     child.close()
-    assert process._socket is not None
-    process._socket.close()
+    assert process._channel is not None
+    process._channel.close()
 
 
 async def test_a_process_that_cannot_be_started_is_a_lost_link_and_leaves_nothing(
@@ -90,19 +91,21 @@ async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_
 ) -> None:
     """A restart that gave up while the child was still loading would begin again for ever."""
     process = host()
-    sockets: list[socket.socket] = []
+    ends: list[ServerEnd | socket.socket] = []
+    children: list[socket.socket] = []
 
-    async def launched() -> socket.socket:
+    async def launched() -> ServerEnd:
         child = await connected(process)
-        assert process._socket is not None
-        sockets.extend((process._socket, child))
-        return process._socket
+        assert process._channel is not None
+        ends.extend((process._channel, child))
+        children.append(child)
+        return process._channel
 
     async def over() -> None:
         assert process._reader is not None
         process._reader.cancel()
         await asyncio.wait([process._reader])
-        for end in sockets:
+        for end in ends:
             end.close()
 
     monkeypatch.setattr(process, "_launch", launched)
@@ -114,7 +117,7 @@ async def test_a_process_that_is_slow_to_start_is_waited_for_and_one_that_hangs_
     await asyncio.sleep(0.05)
     assert not starting.done()
     ready = protocol.pack({"event": "ready", "fifo": 0, "notes": []})
-    await asyncio.get_running_loop().sock_sendall(sockets[-1], ready)
+    await asyncio.get_running_loop().sock_sendall(children[-1], ready)
     await starting
     await over()
 
@@ -145,5 +148,5 @@ async def test_a_request_that_could_not_be_sent_leaves_no_error_that_nobody_take
     # What asyncio looks at when it says that an exception was never retrieved.
     assert answer.done()
     assert not answer._log_traceback
-    assert process._socket is not None
-    process._socket.close()
+    assert process._channel is not None
+    process._channel.close()

@@ -63,7 +63,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ("drivers/modbus/port.py", 'if number == errno.EINVAL or "baud" in text:'): _PYSERIAL,
     (
         "drivers/canopen/adapter.py",
-        'elif code == errno.EAFNOSUPPORT or "AF_CAN" in text:',
+        'if code == errno.EAFNOSUPPORT or "AF_CAN" in words:',
     ): "Python without SocketCAN raises AttributeError or OSError without a number",
     (
         "backend/api/drive/routes.py",

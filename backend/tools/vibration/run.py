@@ -122,10 +122,6 @@ async def run(run: Run, settings: VibrationSettings) -> VibrationResult:
     )
 
 
-#: Fewer further speeds show no shape of the level, unless fewer are asked for.
-_LEAST_CLOSER = 3
-
-
 def _closer(
     settings: VibrationSettings,
     room: Room,
@@ -134,7 +130,7 @@ def _closer(
     left_s: float,
 ) -> tuple[Stroke, ...]:
     """Further speeds within this range, as many as the remaining time allows."""
-    for count in range(settings.closer, min(settings.closer, _LEAST_CLOSER) - 1, -1):
+    for count in range(settings.closer, min(settings.closer, threshold.LEAST_CLOSER) - 1, -1):
         inside = np.geomspace(*about, count + 2)[1:-1]
         speeds = representable(np.asarray(inside, np.float64), units)
         strokes = [one for v in speeds if (one := stroke_of(room, v)) is not None]

@@ -121,7 +121,7 @@ def test_period_after_period_keeps_the_place_that_the_edges_tell() -> None:
 
 
 def test_a_sequence_that_another_one_replaced_is_refused() -> None:
-    with pytest.raises(LinkLost, match="X: the setpoints do not come back"):
+    with pytest.raises(LinkLost, match="X: the setpoints read back from the bus differ"):
         aligned(noise(), recorded(np.flipud(noise())), "X")
 
 

@@ -94,7 +94,7 @@ async def server_ends(bench: Bench, _hub: LiveHub, _job: Job) -> None:
 
 
 CAUSES: list[tuple[Ending, str, str, str]] = [
-    (silent, "work.page-not-reachable", "was not reachable for 2 s", "2 秒无法连通"),
+    (silent, "work.page-not-reachable", "was not reachable for 2 s", "2 s 无法连通"),
     (gone, "work.page-gone", "closed or lost its connection", "已关闭或断开连接"),
     (stopped, "motion.stop-was-pressed", "STOP was pressed", "已按下 STOP"),
     (taken, "work.control-taken", "Boris took control", "Boris 接管"),
@@ -210,7 +210,7 @@ async def test_the_audit_names_the_cause() -> None:
         (
             text("work.page-not-reachable", silent_s=2.0),
             "Move X was cancelled: the page that started it was not reachable for 2 s",
-            "Move X已取消：启动它的页面有 2 秒无法连通",
+            "Move X已取消：启动它的页面有 2 s 无法连通",
         ),
         (None, "Move X was cancelled", "Move X已取消"),
     ],

@@ -170,9 +170,9 @@ def test_letters_that_a_terminal_lacks_do_not_end_a_command(
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--inertia", "nan", "--cycle", "1"], "--inertia is nan"),
-        (["--inertia", "1e-4", "--cycle", "-1"], "--cycle is -1"),
-        (["--inertia", "1e-4", "--cycle", "1", "--voltage", "0"], "--voltage is 0"),
+        (["--inertia", "nan", "--cycle", "1"], "--inertia cannot be nan"),
+        (["--inertia", "1e-4", "--cycle", "-1"], "--cycle cannot be -1"),
+        (["--inertia", "1e-4", "--cycle", "1", "--voltage", "0"], "--voltage cannot be 0"),
     ],
 )
 def test_braking_needs_numbers_of_a_machine(arguments: list[str], says: str) -> None:

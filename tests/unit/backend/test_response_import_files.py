@@ -170,7 +170,7 @@ def _with(row: int, at: int, value: str) -> str:
         (_with(200, 0, "0.1"), "line 202.*goes back"),
         (_with(200, 1, "error"), "line 202, column 2: 'error'"),
         ("\n".join(text().splitlines()[:150] + text().splitlines()[170:]), "line 151.*lost"),
-        ("\n".join(text().splitlines()[:100]), "99 samples"),
+        ("\n".join(text().splitlines()[:100]), "samples: 99"),
         (text(time=np.zeros(N)), "does not rise"),
         (text(time=T + np.where(np.arange(N) % 2, 0.0003, 0.0)), "lost, or the clock is not even"),
         (text(time=np.repeat(T[::2], 2)), "stays at"),

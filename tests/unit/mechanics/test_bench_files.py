@@ -40,7 +40,12 @@ def refused(tmp_path: Path, text: str) -> str:
         ("mms7", "mlink://virtual0", 248, "station 248 of mlink://virtual0 is outside 1 to 247"),
         ("ds_c", "canopen://virtual0", 128, "outside 1 to 127"),
         ("ds_c", "canopen://virtual0", 0, "outside 1 to 127"),
-        ("ds_c", "canopen://socketcan/can0", 1, "answers on no canopen://socketcan/can0"),
+        (
+            "ds_c",
+            "canopen://socketcan/can0",
+            1,
+            "virtual drives do not support canopen://socketcan/can0",
+        ),
         ("mms7", "usb://virtual0", 1, "not a bus URL"),
     ],
 )
