@@ -55,7 +55,7 @@ class LibraryWire:
         self._identities: list[bytes | None] = []
         self._patience_us = 0
         self._losses = 0
-        self._doubted = False
+        self._probes_due = False
         self.mixed_up = False
         """Old answers match new requests: the adapter has to be opened again."""
         self.silent = False
@@ -64,24 +64,24 @@ class LibraryWire:
     def found(self, slaves: Sequence[Slave], patience_us: int) -> None:
         """Set the slaves right after a search, when answers are known to match."""
         self._slaves, self._patience_us = slaves, patience_us
-        self._losses, self._doubted, self.mixed_up = 0, False, False
+        self._losses, self._probes_due, self.mixed_up = 0, False, False
         self._identities = [self._read(slave, _IDENTITY, 2)[0] for slave in slaves]
 
-    def doubt(self) -> None:
+    def require_probes(self) -> None:
         """Note that a call of SOEM failed, with an unknown number of lost frames."""
-        self._doubted = True
+        self._probes_due = True
 
     def count(self, *, came_back: bool) -> None:
         """Count whether a frame came back, of SOEM's process data or of ours."""
         self._losses = 0 if came_back else self._losses + 1
-        self._doubted = self._doubted or self._losses >= _SUSPICIOUS_LOSSES
+        self._probes_due = self._probes_due or self._losses >= _SUSPICIOUS_LOSSES
 
     def in_step(self, patience_us: int) -> bool:
         """Return whether answers match requests; send probes if that is uncertain."""
         self._patience_us = patience_us
-        if self._doubted and not self.mixed_up:
-            self._doubted = not self._probed()
-        return not self._doubted
+        if self._probes_due and not self.mixed_up:
+            self._probes_due = not self._probed()
+        return not self._probes_due
 
     def exchange(self, requests: Sequence[Request], patience_us: int) -> list[bytes | None]:
         """As `drivers.ethercat.process.segment.Segment.exchange`, with one frame for each access.

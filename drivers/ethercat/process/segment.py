@@ -349,7 +349,7 @@ class Segment:
         except pysoem.ConfigMapError as error:
             self.forget_errors()
             if self._library is not None:
-                self._library.doubt()
+                self._library.require_probes()
             reported = sorted({_mapping_error(item) for item in error.error_list})
             raise InvalidMap(
                 "ethercat.process-data-not-mapped", reported="; ".join(reported)
@@ -387,7 +387,7 @@ class Segment:
             if self.socket_fd is not None:
                 set_blocking(self.socket_fd, self._waits)
         if self._library is not None and (time.perf_counter() - began) * 1e6 >= _RECOVER_US:
-            self._library.doubt()
+            self._library.require_probes()
         self.forget_errors()
         return back
 

@@ -126,7 +126,7 @@ def test_answers_are_used_again_after_a_cable_is_mended() -> None:
     assert not made.mixed_up
 
 
-def test_nothing_is_written_while_answers_are_in_doubt() -> None:
+def test_nothing_is_written_before_answers_are_proven() -> None:
     queue = Queue()
     made = wire(queue)
     queue.gone = True
