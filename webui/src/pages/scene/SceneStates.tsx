@@ -4,7 +4,7 @@ import { useAxisStates, useDrives } from '../../live/store'
 import { StateName } from '../../widgets/StateName'
 
 /**
- * The states of the axes over the scene, in the page's language: viser has one label for all who
+ * The states of the axes beneath the scene, in the page's language: viser has one label for all who
  * look, so that in the scene itself a state is a sign, which is explained here. With `axis` of
  * that one alone.
  */
