@@ -112,11 +112,11 @@ class SpeedWatch:
         """Whether the last sample showed motion, or was not sufficient to exclude it."""
         return self._still_since is None
 
-    def at_place_of(self, before: Sample, now: Sample) -> bool:
+    def at_position_of(self, before: Sample, now: Sample) -> bool:
         """Whether both positions agree within the travel of a standing axis, and 606Ch is low.
 
         The travel allowed is that of the speed limit, of `WINDOW_S` at most however old ``before``
-        is: an axis that swings comes back to its old place.
+        is: an axis that oscillates comes back to its old position.
         """
         if now.position is None or before.position is None:
             return False

@@ -131,7 +131,7 @@ class StopWatch:
         return self._unmoved(before, await self._watch.look())
 
     def _unmoved(self, before: Sample, now: Sample) -> bool:
-        return now.state not in _POWERED and self._watch.at_place_of(before, now)
+        return now.state not in _POWERED and self._watch.at_position_of(before, now)
 
     async def _silent(self, problem: Text) -> AxisStop:
         """Retry after a failed first sample; unreachable after `_SILENT_S` without answer."""

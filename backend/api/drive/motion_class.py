@@ -9,6 +9,7 @@ from fastapi import APIRouter, Path
 
 from backend.api.context import Me, TheBench, ThePeople
 from backend.api.errors import NotFound, message_or_none, words_of
+from backend.api.named_profile import profile_named
 from backend.api.security.gate import require_right
 from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
 from backend.audit.asked import note_before
@@ -17,9 +18,7 @@ from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 from drivers.texts.motion_classes import fixed_text, refusal_text
-from drivers.texts.profile_errors import profile_error_text
 from profiles import load_profile
-from profiles.loader import ProfileError
 from profiles.motion.decisions import CannotClassify, classify, forget
 from profiles.schema import Parameter, Profile
 
@@ -31,12 +30,7 @@ _PATH = "/profiles/{profile}/parameters/{key}/motion"
 
 
 def _known(profile: str, key: str) -> tuple[Profile, Parameter]:
-    try:
-        known = load_profile(profile)
-    except ProfileError as error:
-        raise NotFound(
-            profile_error_text(error), value=profile, remedy="api-station.see-profiles"
-        ) from error
+    known = profile_named(profile)
     parameter = known.parameter(key)
     if parameter is None:
         raise NotFound("api-drive.no-parameter-see-list", parameter=key, known_title=known.title)

@@ -10,25 +10,15 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import TheBench
 from backend.api.errors import NotFound, message_of
+from backend.api.named_profile import profile_named
 from backend.api.station.models_description import ImportedList
 from backend.parameters.lists import export_list, import_list
 from backend.parameters.set_file import MAX_BYTES, BadSet
 from backend.work.apart import read_apart
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
-from drivers.texts.profile_errors import profile_error_text
-from profiles import load_profile
-from profiles.loader import ProfileError
-from profiles.schema import Profile
 
 router = APIRouter()
-
-
-def _family(name: str) -> Profile:
-    try:
-        return load_profile(name)
-    except ProfileError as error:
-        raise NotFound(profile_error_text(error), value=name) from error
 
 
 _MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}
@@ -52,7 +42,7 @@ async def export_set(
         raise
     except NotAllowed as error:
         raise NotFound(error.text, value=file) from error
-    profile = _family(content.profile)
+    profile = profile_named(content.profile)
     stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
     name = f"{stem}.{kind}"
     return Response(
@@ -89,7 +79,7 @@ async def store_list(
         if len(data) > MAX_BYTES:
             raise BadSet("api-sets.larger-bytes", file=file, max_bytes=MAX_BYTES)
     content, found = await read_apart(
-        len(data), import_list, bytes(data), _family(profile), file, datetime.now(UTC)
+        len(data), import_list, bytes(data), profile_named(profile), file, datetime.now(UTC)
     )
     stored = await bench.records.store.call(bench.sets.store, file, content, overwrite=overwrite)
     line = text("journal.set-imported", file=stored, count=len(found.readings))

@@ -9,8 +9,9 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from backend.api import convert
 from backend.api.context import TheBench, TheDrive
-from backend.api.errors import NotFound, message_of, words_of
+from backend.api.errors import message_of, words_of
 from backend.api.models import JobInfo
+from backend.api.named_profile import profile_files, profile_named
 from backend.api.station.models import ProfileMatch
 from backend.api.station.models_description import (
     PROFILE_NAME,
@@ -32,15 +33,14 @@ from drivers.link import Found
 from drivers.texts import limits
 from drivers.texts.imports import failure_text, message_of_import, summary_text
 from drivers.texts.message import Text, text
-from drivers.texts.profile_errors import profile_error_text
 from profiles import drive_names, load_profile
 from profiles.importer import ImportFailed, export_eds, export_esi
 from profiles.importer.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.language.overlay import Language, load_overlay
 from profiles.language.texts import translations
-from profiles.loader import ProfileError, user_folder
-from profiles.schema import LinkKind, Profile
+from profiles.loader import user_folder
+from profiles.schema import LinkKind
 
 router = APIRouter()
 
@@ -167,7 +167,7 @@ async def profile_matches(
 @router.get("/profiles/{profile}/eds", response_class=Response)
 async def export_profile(profile: ProfileName) -> Response:
     """Export a profile's objects as a CANopen EDS file."""
-    known = _known(profile)
+    known = profile_named(profile)
     text = export_eds(known, datetime.now())
     return Response(
         text.encode("utf-8"),
@@ -179,7 +179,7 @@ async def export_profile(profile: ProfileName) -> Response:
 @router.get("/profiles/{profile}/esi", response_class=Response)
 async def export_slave_information(profile: ProfileName) -> Response:
     """Export a profile's identity, objects, PDOs and bring-up as an ESI file (ETG.2000)."""
-    known = _known(profile)
+    known = profile_named(profile)
     if known.link("ethercat") is None:
         raise NotAllowed("api-station.no-ethercat-profile", value=profile)
     return Response(
@@ -213,28 +213,14 @@ def _summary(made: ImportedDescription) -> Text:
     return summary_text((each.outcome for each in made.findings), made.not_listed)
 
 
-def _known(name: str) -> Profile:
-    try:
-        return load_profile(name)
-    except ProfileError as error:
-        raise NotFound(
-            profile_error_text(error), value=name, remedy="api-station.see-profiles"
-        ) from error
-
-
 @router.get("/profiles/{profile}/texts")
 async def profile_texts(
     profile: ProfileName,
     language: Annotated[Language, Query(description="language of the texts")],
 ) -> ProfileTexts:
     """Read the texts of a profile in another language, by their English original."""
-    try:
-        known = load_profile(profile)
-        overlay = load_overlay(profile, language)
-    except ProfileError as error:
-        raise NotFound(
-            profile_error_text(error), value=profile, remedy="api-station.see-profiles"
-        ) from error
+    with profile_files(profile):
+        known, overlay = load_profile(profile), load_overlay(profile, language)
     return ProfileTexts(profile=profile, language=language, texts=translations(known, overlay))
 
 

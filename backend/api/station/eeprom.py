@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import Connection, TheBench
-from backend.api.errors import NotFound
+from backend.api.named_profile import profile_named
 from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
 from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
 from backend.audit.asked import note_before
@@ -23,9 +23,6 @@ from drivers.ethercat.eeprom.image import MOST_BYTES, Difference, Image, differe
 from drivers.ethercat.eeprom.plan import Plan
 from drivers.ethercat.link import EthercatLink
 from drivers.texts.message import Text, language, text
-from drivers.texts.profile_errors import profile_error_text
-from profiles.loader import ProfileError, load_profile
-from profiles.schema import Profile
 
 router = APIRouter()
 
@@ -49,15 +46,6 @@ Size = Annotated[
 UnknownAccepted = Annotated[
     bool, Query(description="the file is of this drive although the drive cannot say what it is")
 ]
-
-
-def _imported(name: str) -> Profile:
-    try:
-        return load_profile(name)
-    except ProfileError as error:
-        raise NotFound(
-            profile_error_text(error), value=name, remedy="api-station.see-profiles"
-        ) from error
 
 
 @router.get("/ethercat/eeprom", response_class=Response)
@@ -90,7 +78,7 @@ async def compare_eeprom(
     link = opened_segment(bench, url)
     if profile is not None:
         image = await link.eeprom.read(station, _unheard)
-        found = against_profile(image, _imported(profile))
+        found = against_profile(image, profile_named(profile))
         return _comparison(image, found)
     saved = Image(await _body(request))
     problem = saved.problem()

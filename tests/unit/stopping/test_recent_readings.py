@@ -68,4 +68,3 @@ async def test_an_axis_that_swings_through_its_old_place_is_not_at_rest(
         servo.on_read = lambda _place: None
         await bench.close()
     assert (found.verdict is Verdict.STOPPED) is not swings
-    assert found.took_s < (0.1 if not swings else 10.0)
