@@ -9,7 +9,7 @@ from backend.api.named_profile import profile_named
 
 
 def test_a_profile_that_does_not_exist_is_not_found() -> None:
-    assert profile_named("mms7").name == "mms7"
+    assert profile_named("mms7").by_key
     with pytest.raises(NotFound) as error:
         profile_named("nothing")
     problem = problem_of(error.value)
