@@ -6,6 +6,7 @@ STOP is neither counted nor delayed.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +23,11 @@ MOST_REQUESTS, MOST_OF_STRANGERS, MOST_OF_PLACE = 400, 200, 40
 MOST_FIRST_OF_PLACES = 100
 #: Requests that begin in one turn of the event loop; a turn with nothing else to do is short.
 PER_TURN = 1
+#: A STOP that is carried out holds other requests back for this time at most [s], and then none is
+#: held for this share of it, so that one person who presses STOP all the time shuts nobody out.
+HELD_S, FREE_SHARE = 0.1, 0.25
+#: How often requests that are held back look whether they may begin [s].
+_LOOK_S = 0.002
 #: Rate of requests of unknown clients from one address: burst, and requests per second.
 _STRANGERS = (200.0, 50.0)
 _KEEP = 4096
@@ -32,18 +38,51 @@ class Beginnings:
 
     A turn carries out all that is ready. With hundreds of requests in one turn, STOP, which is
     read in the next turn, would wait for all of them; so their work is spread over turns, and
-    STOP bypasses the queue.
+    STOP bypasses the queue. STOP itself needs several turns, so none begins meanwhile.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._left = PER_TURN
         self._waiting: deque[Callable[[], None]] = deque()
         self._turning = False
+        self._clock = clock
+        self._stops = 0
+        self._held_from = self._held_until = self._free_until = 0.0
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Hold other requests back while a STOP is carried out; see `HELD_S`."""
+        now = self._clock()
+        if self._stops == 0 and now >= self._free_until:
+            self._held_from, self._held_until = now, now + HELD_S
+        self._stops += 1
+        try:
+            yield
+        finally:
+            self._stops -= 1
+            if self._stops == 0:
+                self._end_hold()
+
+    def _end_hold(self) -> None:
+        """Let requests begin, and hold none for a share of the time that they were held."""
+        ended = min(self._clock(), self._held_until)
+        if ended > self._held_from:
+            self._free_until = ended + FREE_SHARE * (ended - self._held_from)
+        self._held_from = self._held_until = 0.0
+
+    @property
+    def _holding(self) -> bool:
+        if self._stops == 0 or self._held_until == 0.0:
+            return False
+        if self._clock() < self._held_until:
+            return True
+        self._end_hold()
+        return False
 
     def begin(self, work: Callable[[], None]) -> None:
         """Run ``work`` now or in one of the next turns, in the order of the calls."""
         self._keep_turning()
-        if self._left > 0 and not self._waiting:
+        if self._left > 0 and not self._waiting and not self._holding:
             self._left -= 1
             work()
         else:
@@ -68,6 +107,10 @@ class Beginnings:
     def _turn(self) -> None:
         self._turning = False
         self._left = PER_TURN
+        if self._waiting and self._holding:
+            self._turning = True
+            asyncio.get_running_loop().call_later(_LOOK_S, self._turn)
+            return
         if self._waiting:
             self._keep_turning()
         while self._waiting and self._left > 0:
@@ -106,7 +149,8 @@ class Admission:
             TooOften: too many requests run.
         """
         if stop:
-            yield
+            with self.beginnings.held():
+                yield
             return
         place = "" if known else address_group(address)
         if self._running >= MOST_REQUESTS:
