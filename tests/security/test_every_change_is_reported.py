@@ -275,7 +275,7 @@ REQUESTS = [
     Ask("POST", "/guests", {"person": "Gina (guest)", "action": "joined"}, {}, "nobody",
         body=joining),
     Ask("PUT", "/invitations/{invitation_id}/grant", OLAF | {
-        "action": "granted", "target": "Gina", "new": "parameters for 2 min"}, INVITED,
+        "action": "granted", "target": "Gina", "new": "parameters, 2 min"}, INVITED,
         options={"json": {"rights": ["parameters"], "minutes": 2}}),
     Ask("DELETE", "/invitations/{invitation_id}/grant", OLAF | {
         "action": "grant withdrawn", "target": "Gina"}, INVITED),

@@ -290,7 +290,7 @@ async def test_a_second_master_on_the_same_interface_is_refused(rig: Rig) -> Non
 
 @pytest.mark.parametrize(
     ("name", "words"),
-    [("x" * 16, "1 to 15 letters"), ("nosuch0", "no network interface 'nosuch0'")],
+    [("x" * 16, "1 to 15 characters"), ("nosuch0", "no network interface 'nosuch0'")],
 )
 async def test_wrong_interfaces_end_in_words(rig: Rig, name: str, words: str) -> None:
     link = EthercatLink(name, launcher=rig.namespace.command([]))

@@ -170,7 +170,7 @@ def test_dropped_transactions_end_with_an_error() -> None:
         lanes.submit(1, "mailbox", job(), lambda _r, e: ended.append(e))
     lanes.step()
     lanes.drop(text("event.interface-gone", interface="eth9"))
-    assert [str(e) for e in ended] == ["the interface eth9 is gone"] * 2
+    assert [str(e) for e in ended] == ["the interface eth9 has disappeared"] * 2
     assert not lanes.pending()
 
 
