@@ -138,7 +138,9 @@ def shown(cause: Cause) -> dict[str, Any]:
         "code": cause.code,
         "weight": cause.weight,
         "title": text.title,
+        "title_zh": text.zh,
         "remedy": text.remedy,
+        "remedy_zh": text.zh_remedy,
         "facts": [
             asdict(fact)
             | {
@@ -156,21 +158,22 @@ def _show(results: list[dict[str, Any]], *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(results, indent=1))
         return
+    ending = "_zh" if language() == "zh" else ""
     for each in results:
         if each["reached"]:
             print_text("printed.reaches-operational", station=str(each["station"]))
             continue
         head = words_of("printed.station", station=str(each["station"]))
-        print(f"{head}: {each['refusal'] or words_of('printed.not-operational')}")
+        # A server examines the state as it is, so that no start was refused.
+        print(f"{head}: {each.get('refusal') or words_of('printed.not-operational')}")
         for number, cause in enumerate(each["causes"], start=1):
-            print(f"  {number}. {cause['title']}")
+            print(f"  {number}. {cause['title' + ending]}")
             for fact in cause["facts"]:
-                label = fact["label_zh"] if language() == "zh" else fact["label"]
-                line = f"     {label}: {fact['shown']}"
+                line = f"     {fact['label' + ending]}: {fact['shown']}"
                 if fact["shown_expected"] is not None:
                     line += words_of("printed.should-be", expected=str(fact["shown_expected"]))
                 print(line)
-            print_text("printed.cause-remedy", remedy=str(cause["remedy"]))
+            print_text("printed.cause-remedy", remedy=str(cause["remedy" + ending]))
         _show_trials(each.get("trials"))
 
 

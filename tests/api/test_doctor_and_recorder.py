@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.station.recording import capture
+from drivers.texts.message import speaking
 from drivers.virtual.wires.netns import unavailable
 from tests.support.station import HANG_S, Station, until
 
@@ -192,6 +193,10 @@ def test_the_command_shows_causes_with_facts_and_ends_with_1(station: Station) -
     rows = json.loads(command(station, "doctor", CAN, "--station", "3", "--json", code=1))
     assert rows[0]["station"] == 3
     assert rows[0]["causes"][0]["facts"]
+    with speaking("zh"):
+        chinese = command(station, "doctor", CAN, "--station", "3", code=1)
+    assert rows[0]["causes"][0]["title_zh"] in chinese
+    assert rows[0]["causes"][0]["remedy_zh"] in chinese
     assert "the doctor supports" in command(station, "doctor", LINE, code=1)
 
 
