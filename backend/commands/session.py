@@ -19,6 +19,7 @@ from backend.drive.ports import Port
 from backend.restore.store import Pending
 from backend.station.matching import match_profiles, profile_for
 from backend.work.jobs import Progress
+from backend.work.sleep_watch import SleepWatch
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link
@@ -82,10 +83,33 @@ def run_in_order(work: Callable[[], Awaitable[T]]) -> T:
     # The event loop turns only SIGINT into a cancellation, and only where it is not ignored.
     with signals.interruptible():
         try:
-            return _run(work)
+            return _run(lambda: _unless_asleep(work))
         except KeyboardInterrupt:
             note("printed.cancelled-axis-disabled")
             raise typer.Exit(130) from None
+
+
+async def _unless_asleep(work: Callable[[], Awaitable[T]]) -> T:
+    """Cancel the work, which restores values and disables the axis, if the computer slept.
+
+    Raises:
+        NotAllowed: it slept, and the work has ended.
+    """
+    task, slept = asyncio.ensure_future(work()), list[float]()
+
+    def awoke(gap_s: float) -> None:
+        slept.append(gap_s)
+        task.cancel()
+
+    watch = asyncio.create_task(SleepWatch(awoke).run())
+    try:
+        return await task
+    except asyncio.CancelledError:
+        if slept:
+            raise NotAllowed("station.computer-slept", gap_s=slept[0]) from None
+        raise
+    finally:
+        watch.cancel()
 
 
 def until_interrupted(work: Callable[[], Awaitable[None]]) -> None:

@@ -153,6 +153,20 @@ class Motion:
         self._later.add(task)
         task.add_done_callback(self._later.discard)
 
+    def awoke(self, gap_s: float) -> None:
+        """Stop every axis that may move or is enabled: the computer slept for ``gap_s`` [s]."""
+        line = text("station.computer-slept", gap_s=gap_s)
+        self._bench.journal.add(line, level="warning")
+        granted = self._bench.authority.grant_of
+        drives = [each for each in self._bench.connected_drives if granted(each) is not None]
+        if drives:
+            task = asyncio.create_task(self._stop_after_sleep(drives, line), name="stop-awoke")
+            self._later.add(task)
+            task.add_done_callback(self._later.discard)
+
+    async def _stop_after_sleep(self, drive_ids: Sequence[str], why: Text) -> None:
+        await self.stop(drive_ids, why)
+
     async def stop(
         self, drive_ids: Sequence[str], why: Text = _STOP_PRESSED
     ) -> dict[str, Text | None]:

@@ -14,9 +14,12 @@ def resolution_s() -> float:
 def elapsed_s() -> float:
     """Return the seconds since a time before the start of this process; never set, never back.
 
-    Includes the time in which the computer slept on Linux (CLOCK_BOOTTIME).
+    Includes the time in which the computer slept: CLOCK_BOOTTIME on Linux, CLOCK_MONOTONIC on
+    macOS, whose `time.monotonic` stands still meanwhile, and GetTickCount64 on Windows.
     """
     if sys.platform == "linux":
         return time.clock_gettime(time.CLOCK_BOOTTIME)
-    else:  # noqa: RET505 - type checkers follow the branches of a system
+    elif sys.platform == "darwin":  # noqa: RET505 - type checkers follow the branches of a system
+        return time.clock_gettime(time.CLOCK_MONOTONIC)
+    else:
         return time.monotonic()

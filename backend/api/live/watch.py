@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from backend.people.station import People
 from backend.station.bench import Bench
+from backend.work.sleep_watch import PERIOD_S, SleepWatch
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ log = logging.getLogger(__name__)
 #: With the quarter second between checks, a silent connection loses control within `SILENT_END_S`,
 #: and motion that it commanded ends. [s]
 SILENCE_S = 1.7
-_LOOK_S, _HOLD_LOOK_S, _TEND_S = 0.25, 0.02, 5.0
+_LOOK_S, _HOLD_LOOK_S, _TEND_S = PERIOD_S, 0.02, 5.0
 #: Silence after which a page has lost control [s], as shown to people.
 SILENT_END_S = 2.0
 
@@ -38,6 +39,7 @@ class PeopleWatch:
     ) -> None:
         self._bench, self._people, self._pages = bench, people, pages
         self._fell_silent = fell_silent
+        self._sleep = SleepWatch(bench.motion.awoke)
         #: Set when an enabling button is pressed; while it is held it is checked 50 times a second.
         self.hold_pressed = asyncio.Event()
 
@@ -51,6 +53,8 @@ class PeopleWatch:
     async def _look(self) -> None:
         leases = self._bench.leases
         while True:
+            with _going_on():
+                self._sleep.look()
             now = time.monotonic()
             for page in list(self._pages.values()):
                 if now - page.heard > SILENCE_S:

@@ -9,11 +9,11 @@ moves nothing: what was sent together with it, above all a release, is processed
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.thresholds import jog_hold as threshold
+from drivers.computer.clock import elapsed_s
 from drivers.texts.message import Text, text
 
 GAP_S = threshold.GAP_S
@@ -24,17 +24,18 @@ _EXPIRED = text("jog.end-no-sign-of-life", silent_ms=1e3 * RESUME_S)
 
 
 class Hold:
-    """Hold state of the button of the person who jogs. ``clock`` returns monotonic seconds.
+    """Hold state of the button of the person who jogs.
 
-    ``number`` is the number of the press, to distinguish its signs from those of an earlier press;
-    signs without one (0) count for any press. ``paused`` is called with True when a gap begins and
-    with False when the motion continues, with the present length of the gap in s.
+    ``clock`` returns seconds that include the time in which the computer slept. ``number`` is the
+    number of the press, to distinguish its signs from those of an earlier press; signs without one
+    (0) count for any press. ``paused`` is called with True when a gap begins and with False when
+    the motion continues, with the present length of the gap in s.
     """
 
     def __init__(
         self,
         number: int = 0,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = elapsed_s,
         paused: Callable[[bool, float], None] = lambda _braked, _s: None,
     ) -> None:
         self.number = number
