@@ -5,7 +5,11 @@ from __future__ import annotations
 import asyncio
 import subprocess
 import sys
+from collections.abc import Iterator
 
+import pytest
+
+from drivers.virtual.wires.netns import Namespace, unavailable
 from tests.wire.ethercat_host.conftest import Rig
 
 #: In the namespace: the flag that somebody set for good, and who wants the mode at all.
@@ -22,6 +26,15 @@ flags = struct.unpack("16sH14x", fcntl.ioctl(line, 0x8913, request))[1]
 flags = flags | 0x100 if sys.argv[2] == "on" else flags & ~0x100
 fcntl.ioctl(line, 0x8914, struct.pack("16sH14x", sys.argv[1].encode(), flags))
 """
+
+
+@pytest.fixture(scope="module")
+def namespace() -> Iterator[Namespace]:
+    """A network of its own: SOEM alone, as in `test_library_frames`, leaves the flag set."""
+    if reason := unavailable():
+        pytest.skip(reason)
+    with Namespace.create() as made:
+        yield made
 
 
 def inside(rig: Rig, *argv: str) -> str:
