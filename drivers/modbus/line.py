@@ -31,6 +31,7 @@ from drivers.modbus.framing import (
     write_many_query,
     write_one_query,
 )
+from drivers.modbus.held_back import HeldBack
 from drivers.modbus.late import LateAnswers
 from drivers.modbus.port import LineSettings, Port, is_pseudo_terminal, open_port
 from drivers.modbus.timing import sleep_precisely
@@ -89,6 +90,7 @@ class Line:
         self._restless = False
         self._echo_taken = False
         self._quiet_since = 0.0
+        self._held_back = HeldBack()
 
     @property
     def is_open(self) -> bool:
@@ -108,6 +110,7 @@ class Line:
         if is_pseudo_terminal(self.settings.device):
             self._parity = "none (pseudo-terminal)"
         self.echo = None
+        self._held_back.clear()
         self._late.clear()
         self._last_failed = b""
         self._restless = True  # old bytes may be waiting
@@ -184,6 +187,7 @@ class Line:
             picked = [self._counters.get(station, Counters())]
         times = [c.round_trip_ms for c in picked if c.round_trip_ms is not None]
         echo = {None: "unknown", True: "yes", False: "no"}[self.echo]
+        held_s = self._held_back.timer_s() if self.is_open else None
         return LinkQuality(
             connected=self.is_open,
             transactions=sum(c.transactions for c in picked),
@@ -192,7 +196,7 @@ class Line:
             framing_errors=sum(c.framing_errors for c in picked),
             retries=sum(c.retries for c in picked),
             round_trip_ms=sum(times) / len(times) if times else None,
-            state=text("link.open" if self.is_open else "link.no-adapter"),
+            state=self._state(held_s),
             details={
                 "baudrate": self.settings.baudrate,
                 "parity": self._parity,
@@ -201,8 +205,16 @@ class Line:
                 "refusals": sum(c.refusals for c in picked),
                 "late_checks": sum(c.late_checks for c in picked),
                 "late_answers": sum(c.late_answers for c in picked),
+                **({} if held_s is None else {"held_back_ms": round(held_s * 1000, 1)}),
             },
         )
+
+    def _state(self, held_s: float | None) -> Text:
+        if not self.is_open:
+            return text("link.no-adapter")
+        if held_s is None:
+            return text("link.open")
+        return text("link.held-back", held_ms=held_s * 1000, reads=1 / held_s)
 
     # --- one transaction ---
 
@@ -249,6 +261,7 @@ class Line:
             late.failed(query, self._clock() + settings.late_s)
             self._fail(query, answer, received, counters, limit_s)
         self._accept(answer, received, counters, sent_at)
+        self._held_back.add(wire_s, self._quiet_since - sent_at)
         code = answer.exception
         if code is not None:
             counters.refusals += 1

@@ -7,6 +7,7 @@ link_frames-not-being-recorded = the frames of { $interface } are not being reco
     .remedy = close the bus and open it again; recording needs the same permission for raw sockets as the exchange
 link_gives-option-twice = { QUOTED($value) } gives an option twice
 link_names-no-adapter = { QUOTED($value) } names no adapter
+link_held-back = open; the adapter holds answers back for { NUM($held_ms, format: ".0f") } ms, so that at most { NUM($reads, format: ".0f") } reads per second are possible: set its latency timer to 1 ms
 link_no-adapter = no adapter
 link_no-answer = no answer
 link_no-bus-url-must = { QUOTED($value) } is not a bus URL: it must start with { $schemes }

@@ -7,6 +7,7 @@ link_frames-not-being-recorded = 未记录 { $interface } 的报文
     .remedy = 关闭该总线后重新打开；记录报文与数据交换一样需要原始套接字权限
 link_gives-option-twice = { QUOTED($value) } 重复给出选项
 link_names-no-adapter = { QUOTED($value) } 未指定适配器
+link_held-back = 已打开；适配器把应答延迟 { NUM($held_ms, format: ".0f") } ms，每秒最多读取 { NUM($reads, format: ".0f") } 次：请将其延迟计时器（Latency Timer）设为 1 ms
 link_no-adapter = 没有适配器
 link_no-answer = 无应答
 link_no-bus-url-must = { QUOTED($value) } 不是总线 URL：须以 { $schemes } 开头

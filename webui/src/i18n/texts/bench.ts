@@ -108,6 +108,7 @@ export const bench = {
   'quality.echo': ['Adapter echoes', '适配器回显'],
   'quality.losses': ['Adapter disconnections', '适配器断开次数'],
   'quality.refusals': ['Refused by the drive', '驱动器拒绝'],
+  'quality.heldBack': ['Answers held back by the adapter', '适配器延迟应答'],
   'quality.lateChecks': ['Late checks', '延迟检查'],
   'quality.lateAnswers': ['Late answers', '迟到应答'],
   'quality.strayAnswers': ['Unrequested answers', '未请求的应答'],

@@ -59,6 +59,7 @@ const NAMED = {
   echo: 'quality.echo',
   losses: 'quality.losses',
   refusals: 'quality.refusals',
+  held_back_ms: 'quality.heldBack',
   late_checks: 'quality.lateChecks',
   late_answers: 'quality.lateAnswers',
   stray_answers: 'quality.strayAnswers',
