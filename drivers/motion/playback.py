@@ -175,6 +175,9 @@ class AxisLoop:
             NotAllowed: not enabled, a required object is not mapped, or the first value is a jump.
         """
         self.check(motion)
+        # An end before the first value brakes from here; the place or speed of an earlier motion
+        # must not become a setpoint of this one.
+        self._setpoint = self.setpoint_now(motion.target) or 0
         self._motion = motion
         self._place = 0
         self._life = motion.renew_cycles

@@ -1,0 +1,80 @@
+"""Ends of motions in the loop of an axis: no setpoint but those of this motion and its ramp."""
+
+from __future__ import annotations
+
+import array
+import itertools
+
+import pytest
+
+from drivers.cia402 import Mode, State
+from drivers.halt import HaltCause, Halted
+from drivers.motion.playback import STOP_S, AxisLoop
+from drivers.motion.setpoint_plan import (
+    ACTUAL_POSITION,
+    CONTROL,
+    MODE_SHOWN,
+    POSITION,
+    STATUS,
+    TORQUE,
+    VELOCITY,
+    Limits,
+    Motion,
+    Phase,
+)
+
+OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
+ENABLED, DISABLED = 0x0237, 0x0250
+RAMP = round(STOP_S / 0.001)
+RELEASED = Halted(HaltCause.COMMANDED)
+
+
+class Bench:
+    """An enabled axis of a drive that follows each word of the test."""
+
+    def __init__(self, position: int, mode: Mode) -> None:
+        self.axis = AxisLoop(
+            1,
+            inputs={STATUS: 0, ACTUAL_POSITION: 1, MODE_SHOWN: 2},
+            outputs=OUT,
+            output_count=len(OUT),
+            cycle_s=0.001,
+            report=lambda _station, _why: None,
+        )
+        self.status, self.position, self.mode = DISABLED, position, mode
+        self.step()
+        self.axis.drive_to(State.OPERATION_ENABLED, None)
+        self.status = ENABLED
+        self.step(5)
+
+    def step(self, cycles: int = 1) -> None:
+        for _ in range(cycles):
+            self.axis.step((self.status, self.position, int(self.mode)))
+
+    def out(self, index: int) -> int:
+        return self.axis.outputs[OUT[index]]
+
+    def play(self, target: int, values: list[int], limits: Limits | None = None) -> None:
+        steps = [abs(b - a) for a, b in itertools.pairwise(values)]
+        longest = max(steps, default=0)
+        self.axis.play(Motion(target, array.array("q", values), limits or Limits(), 5000, longest))
+
+
+@pytest.mark.parametrize("by", ["command", "envelope"])
+def test_a_velocity_that_ends_before_its_first_value_takes_no_earlier_setpoint(by: str) -> None:
+    bench = Bench(1_000_000, Mode.CSP)
+    bench.play(POSITION, [1_000_000] * 2)
+    bench.step(3)
+    bench.axis.pause()
+    bench.step(RAMP + 1)
+    assert bench.axis.phase is Phase.IDLE
+    bench.mode = Mode.CSV
+    bench.step()
+    bench.play(VELOCITY, [0] * 50, Limits(position_max=900_000 if by == "envelope" else None))
+    if by == "command":
+        bench.axis.stop(RELEASED)
+    seen = set()
+    for _ in range(RAMP + 2):
+        bench.step()
+        seen.add(bench.out(VELOCITY))
+    assert seen == {0}
