@@ -529,7 +529,7 @@ class AxisLoop:
                 wanted=int(wanted),
                 mode_names=cia402.MODE_NAMES[wanted],
             )
-        motion.limits.require_watched(self._in, where)
+        motion.limits.require_watched(self._in, where, motion.target)
         if self.phase is Phase.BRAKING:
             raise NotAllowed("cyclic.braking", where=where, why=self._why)
         if not len(motion.values):

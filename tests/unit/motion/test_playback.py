@@ -8,6 +8,7 @@ import itertools
 import pytest
 
 from drivers.cia402 import Mode, State
+from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import (
@@ -78,3 +79,14 @@ def test_a_velocity_that_ends_before_its_first_value_takes_no_earlier_setpoint(b
         bench.step()
         seen.add(bench.out(VELOCITY))
     assert seen == {0}
+
+
+def test_a_limit_of_the_following_error_without_anything_to_compute_it_from_is_refused() -> None:
+    bench = Bench(0, Mode.CSV)
+    with pytest.raises(NotAllowed, match="60F4h is not mapped"):
+        bench.play(VELOCITY, [0] * 50, Limits(following_error_max=50))
+    assert bench.axis.phase is Phase.IDLE
+    bench.mode = Mode.CSP
+    bench.step()
+    bench.play(POSITION, [0] * 50, Limits(following_error_max=50))
+    assert bench.axis.phase is Phase.PLAYING
