@@ -43,6 +43,7 @@ from drivers.motion.setpoint_plan import (
 )
 from drivers.texts.message import Text, text
 from drivers.texts.states import state_text
+from profiles.schema import INTEGER_RANGE
 
 STOP_S = 0.1
 """Ramp time from any speed to standstill [s]; below the 200 ms in which lost setpoints must end."""
@@ -51,6 +52,8 @@ LET_GO_S = 0.05
 
 _RESTLESS = 2
 """Encoder noise of an axis at standstill, in increments per cycle."""
+_LOWEST, _HIGHEST = INTEGER_RANGE["INT32"]
+"""Range of a position setpoint [increments] (CiA 402-2, 607Ah)."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
@@ -419,7 +422,9 @@ class AxisLoop:
         if self._brake_target == POSITION:
             self._speed -= self._brake_step
             if self._brake_left > 0:
-                self._setpoint += self._speed
+                # Beyond the limits of its type a setpoint could not be sent, nor could the
+                # control word that follows.
+                self._setpoint = min(max(self._setpoint + self._speed, _LOWEST), _HIGHEST)
             self._set(POSITION, round(self._setpoint))
         else:
             self._setpoint = self._setpoint - self._brake_step if self._brake_left > 0 else 0.0

@@ -45,8 +45,8 @@ class Bench:
         self.status, self.position, self.mode = DISABLED, position, mode
         self.step()
         self.axis.drive_to(State.OPERATION_ENABLED, None)
-        self.status = ENABLED
-        self.step(5)
+        for self.status in (DISABLED, 0x0231, 0x0233, ENABLED):
+            self.step()
 
     def step(self, cycles: int = 1) -> None:
         for _ in range(cycles):
@@ -85,8 +85,24 @@ def test_a_limit_of_the_following_error_without_anything_to_compute_it_from_is_r
     bench = Bench(0, Mode.CSV)
     with pytest.raises(NotAllowed, match="60F4h is not mapped"):
         bench.play(VELOCITY, [0] * 50, Limits(following_error_max=50))
-    assert bench.axis.phase is Phase.IDLE
     bench.mode = Mode.CSP
     bench.step()
     bench.play(POSITION, [0] * 50, Limits(following_error_max=50))
     assert bench.axis.phase is Phase.PLAYING
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_ramp_ends_at_the_limit_of_the_type_and_the_axis_is_disabled(sign: int) -> None:
+    begin = sign * (2**31 - 1 - 20_000)
+    bench = Bench(begin, Mode.CSP)
+    path = [begin + sign * 1000 * n for n in range(20)]
+    bench.play(POSITION, path)
+    bench.step(len(path) - 1)
+    bench.axis.stop(RELEASED)
+    seen = []
+    for _ in range(RAMP + 5):
+        bench.position = bench.out(POSITION)
+        bench.step()
+        seen.append(bench.out(POSITION))
+    assert all(-(2**31) <= value < 2**31 for value in seen), "it fits its object"
+    assert bench.out(CONTROL) == 0x06
