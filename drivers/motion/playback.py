@@ -166,7 +166,12 @@ class AxisLoop:
         self.goal = goal
 
     def reset_fault(self) -> None:
-        """Reset a fault once; the axis stays disabled."""
+        """Reset a fault once; the axis stays disabled.
+
+        Does nothing to an axis that is enabled or in a quick stop: without power it would coast.
+        """
+        if self.state in _ALIVE_STATES:
+            return
         self._reset = True
         self.goal = State.SWITCH_ON_DISABLED
         self.halted = None

@@ -106,3 +106,13 @@ def test_a_ramp_ends_at_the_limit_of_the_type_and_the_axis_is_disabled(sign: int
         seen.append(bench.out(POSITION))
     assert all(-(2**31) <= value < 2**31 for value in seen), "it fits its object"
     assert bench.out(CONTROL) == 0x06
+
+
+def test_a_reset_of_a_fault_leaves_an_axis_without_fault_as_it_is() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.play(POSITION, [10 * n for n in range(200)])
+    bench.step(10)
+    bench.axis.reset_fault()
+    bench.step()
+    assert bench.out(CONTROL) == 0x0F
+    assert bench.axis.phase is Phase.PLAYING
