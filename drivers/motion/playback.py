@@ -63,6 +63,8 @@ _STALE_CYCLES = 3
 """Samples that may be older than a state a mailbox reported before the axis was enabled again."""
 _SETTLES = 2
 """An axis that lags behind its ramp may take this many ramp times longer to come to a hold."""
+_RESET_S = 3.0
+"""How long a fault that stays is reset [s]: as long as a person waits for the result."""
 _REST_S, _GIVE_UP = 0.05, 30
 """Dwell without motion that counts as standstill [s]; time-out as a multiple of this dwell."""
 
@@ -106,6 +108,8 @@ class AxisLoop:
         self._place = 0
         self._life = 0
         self._reset = False
+        self._reset_left = 0
+        self._reset_cycles = max(round(_RESET_S / cycle_s), 1)
         self._setpoint = 0.0
         self._speed = 0.0
         self._brake_step = 0.0
@@ -172,7 +176,7 @@ class AxisLoop:
         """
         if self.state in _ALIVE_STATES:
             return
-        self._reset = True
+        self._reset, self._reset_left = True, self._reset_cycles
         self.goal = State.SWITCH_ON_DISABLED
         self.halted = None
 
@@ -461,9 +465,12 @@ class AxisLoop:
                 self.goal = State.SWITCH_ON_DISABLED
         if self.goal is None:
             return
-        if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:
-            self.outputs[place] = cia402.DISABLE_VOLTAGE
-            return
+        if self.state in (State.FAULT, State.FAULT_REACTION):
+            self._reset_left -= 1
+            if not self._reset or self._reset_left < 0:
+                self._reset = False
+                self.outputs[place] = cia402.DISABLE_VOLTAGE
+                return
         if self._brakes_itself:
             # A limit switch or the drive itself began a quick stop, which needs power for braking.
             if self.state is State.QUICK_STOP_ACTIVE and self._may_brake():

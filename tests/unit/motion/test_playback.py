@@ -25,7 +25,7 @@ from drivers.motion.setpoint_plan import (
 )
 
 OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
-ENABLED, DISABLED = 0x0237, 0x0250
+ENABLED, DISABLED, FAULT = 0x0237, 0x0250, 0x0218
 RAMP = round(STOP_S / 0.001)
 RELEASED = Halted(HaltCause.COMMANDED)
 
@@ -116,3 +116,19 @@ def test_a_reset_of_a_fault_leaves_an_axis_without_fault_as_it_is() -> None:
     bench.step()
     assert bench.out(CONTROL) == 0x0F
     assert bench.axis.phase is Phase.PLAYING
+
+
+def test_a_fault_that_stays_is_not_reset_by_itself_long_after_the_command() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.status = FAULT
+    bench.step(5)
+    bench.axis.reset_fault()
+    words = []
+    for _ in range(10_000):
+        bench.step()
+        words.append(bench.out(CONTROL) & 0x80)
+    assert 0x80 in words[:10]
+    assert not any(words[5000:])
+    bench.axis.reset_fault()
+    bench.step()
+    assert bench.out(CONTROL) & 0x80, "another command resets it again"
