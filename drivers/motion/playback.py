@@ -190,6 +190,7 @@ class AxisLoop:
         # An end before the first value brakes from here; the place or speed of an earlier motion
         # must not become a setpoint of this one.
         self._setpoint = self.setpoint_now(motion.target) or 0
+        self._clear_offsets()
         self._motion = motion
         self._place = 0
         self._life = motion.renew_cycles

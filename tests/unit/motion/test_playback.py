@@ -132,3 +132,15 @@ def test_a_fault_that_stays_is_not_reset_by_itself_long_after_the_command() -> N
     bench.axis.reset_fault()
     bench.step()
     assert bench.out(CONTROL) & 0x80, "another command resets it again"
+
+
+def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
+    bench = Bench(0, Mode.CSP)
+    some = array.array("q", [0] * 50)
+    offsets = array.array("q", [70] * 50)
+    bench.axis.play(Motion(POSITION, some, Limits(), 5000, 0, 0x60B2, offsets))
+    bench.step(10)
+    assert bench.out(0x60B2) == 70
+    bench.play(POSITION, [0] * 50)
+    bench.step()
+    assert bench.out(0x60B2) == 0
