@@ -53,7 +53,6 @@ class Operations:
         self._ring = ring
         self._send = send
         self._starved = 0
-        self._loading: set[int] = set()
         self._check: tuple[Check, Done] | None = None
         self._eeprom = EepromOperations(self.roster, self.lanes, self._progress_of)
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
@@ -360,7 +359,7 @@ class Operations:
             raise Busy("ethercat.cyclic-exchange-runs")
 
         def ended(where: str | None, error: DriveError | None) -> None:
-            self._loading.discard(station.number)
+            self.roster.loading.discard(station.number)
             done({"state": where}, error)
 
         steps = firmware.load(
@@ -373,7 +372,7 @@ class Operations:
             clock=time.monotonic,
             report=lambda share, step: self._progress(message, share, step),
         )
-        self._loading.add(station.number)
+        self.roster.loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)
 
     def _require_parameters(self, station: Station) -> None:
@@ -388,7 +387,7 @@ class Operations:
             Busy: firmware is being loaded into it.
         """
         station = self.roster.station(message)
-        if station.number in self._loading:
+        if station.number in self.roster.loading:
             raise Busy("ethercat.station-being-loaded-firmware", station=station.number)
         return station
 
