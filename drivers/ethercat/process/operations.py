@@ -146,6 +146,7 @@ class Operations:
         self.roster.is_open = False
 
     def _scan(self, message: Message, done: Done) -> None:
+        self.roster.require_not_held()
         wanted = message.get("stations")
         known = wanted is not None and self.roster.knows(wanted)
         if not known:
@@ -350,13 +351,14 @@ class Operations:
                 self.roster.new_aliases.add(station.number)
             done({"alias": reported}, error)
 
-        steps = sii.write_alias(alias, time.monotonic)
+        steps = transactions.with_eeprom(station, sii.write_alias(alias, time.monotonic))
         self.lanes.submit(station.number, "register", steps, ended)
 
     def _foe(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("ethercat.cyclic-exchange-runs")
+        self.roster.require_not_held()
 
         def ended(where: str | None, error: DriveError | None) -> None:
             self.roster.loading.discard(station.number)
