@@ -321,8 +321,8 @@ class EthercatLink:
             LinkLost: the host or the interface is gone.
         """
         stations = (await self.survey()).stations
-        if all(each.station != station for each in stations):
-            # The search before the refusal did not find it.
+        if all(each.station != station or each.lost for each in stations):
+            # The search before the refusal did not find it, or it was lost since.
             found = Evidence(station=station, answers=False)
             return found, diagnose(found)
         facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
