@@ -111,8 +111,14 @@ class EthercatLink:
         if not RAW_FRAMES:
             _require_capture(self.interface)
         await self._host.start()
-        if self._raw_frames:
+        if not self._raw_frames:
+            return
+        try:
             await self.recorder.start()
+        except BaseException:
+            # Cancelled: whoever opens it again would find the interface in use.
+            await self.close()
+            raise
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Further calls have no effect."""
