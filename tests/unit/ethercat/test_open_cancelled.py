@@ -7,17 +7,17 @@ import asyncio
 import pytest
 
 from drivers.ethercat.link import EthercatLink
-from drivers.texts.message import text
 
 
 class Host:
-    running, why = False, text("ethercat.process-not-opened")
+    def __init__(self) -> None:
+        self.calls: list[str] = []
 
     async def start(self) -> None:
-        self.running = True
+        self.calls.append("start")
 
     async def stop(self) -> None:
-        self.running = False
+        self.calls.append("stop")
 
 
 class Recorder:
@@ -38,9 +38,8 @@ async def test_a_search_cancelled_while_the_bus_opens_lets_go_of_the_interface()
     link._host, link.recorder = host, recorder  # type: ignore[assignment]
     opening = asyncio.create_task(link.open())
     await recorder.starting.wait()
-    assert host.running
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
-    assert not host.running
+    assert host.calls == ["start", "stop"]
     assert recorder.stopped
