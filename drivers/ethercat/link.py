@@ -6,6 +6,7 @@ incident is an event. Nothing here blocks, as the other process owns the wire.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -408,7 +409,12 @@ class EthercatLink:
     def _notify(self, event: LinkEvent) -> None:
         self.recorder.note(f"{event.kind}: {event.text.words()}", event.station)
         for listener in tuple(self._listeners):
-            listener(event)
+            try:
+                listener(event)
+            except Exception as error:
+                # Raised here it would be taken for a fault of the host process, which is replaced.
+                context = {"message": f"a listener failed at {event}", "exception": error}
+                asyncio.get_running_loop().call_exception_handler(context)
 
 
 def _found(item: Message) -> Found:
