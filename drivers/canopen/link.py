@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import can
 
+from drivers.canopen import sdo
 from drivers.canopen.adapter import open_bus
 from drivers.canopen.bus import BUS
 from drivers.canopen.channel import SdoChannel
@@ -312,7 +313,7 @@ class CanopenLink:
     def _read_now(self, station: int, address: Address) -> bytes:
         index, subindex = _object(address)
         data = self._sdo_read(station, index, subindex)
-        return _fit(data, size_of(address.type))
+        return sdo.fitted(data, size_of(address.type))
 
     def _sdo_read(self, station: int, index: int, subindex: int) -> bytes:
         self._in_use(station)
@@ -448,20 +449,6 @@ def _object(address: Address) -> tuple[int, int]:
     if address.index is None:
         raise NotAllowed("canopen.exists-over-modbus", parameter=str(address), address=str(address))
     return address.index, address.subindex
-
-
-def _fit(data: bytes, size: int | None) -> bytes:
-    """Cut ``data`` to ``size`` if only padding is removed.
-
-    Some drives send four bytes for every object, filled with zeros or with the sign.
-    """
-    if size is None or len(data) <= size:
-        return data
-    rest = data[size:]
-    sign = b"\xff" if data[size - 1] & 0x80 else b"\0"
-    if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
-        return data[:size]
-    return data
 
 
 def can_bus_of(link: Link | None) -> CanopenLink | None:

@@ -254,6 +254,20 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
         yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
 
 
+def fitted(data: bytes, size: int | None) -> bytes:
+    """Cut ``data`` to ``size`` if only padding is removed.
+
+    Some drives send four bytes for every object, filled with zeros or with the sign.
+    """
+    if size is None or len(data) <= size:
+        return data
+    rest = data[size:]
+    sign = b"\xff" if data[size - 1] & 0x80 else b"\0"
+    if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
+        return data[:size]
+    return data
+
+
 def answers(frame: bytes, exchange: Exchange) -> bool:
     """Return whether ``frame`` can be the answer to ``exchange``: same object, or a segment.
 
