@@ -95,6 +95,7 @@ def upload(index: int, subindex: int, block_above: int | None = None) -> Transfe
 def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
     data = bytearray()
     toggle = 0
+    empty = 0
     while True:
         answer = yield Exchange((bytes([0x60 | toggle]) + bytes(7),), None)
         _raise_abort(answer, mux, writing=False)
@@ -110,6 +111,9 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
             )
         if command & 0x01:
             break
+        empty = 0 if command >> 1 & 7 < 7 else empty + 1
+        if empty > _BLOCK:
+            yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.same-segments"))
         toggle ^= 0x10
     if announced is not None and len(data) != announced:
         raise ProtocolError(
