@@ -120,8 +120,16 @@ class CanopenLink:
             return
         self._loop = asyncio.get_running_loop()
         workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="canopen")
+        opening = self._loop.run_in_executor(workers, self._port.open)
         try:
-            await self._loop.run_in_executor(workers, self._port.open)
+            await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            # The thread cannot be interrupted; what it opens would stay in use.
+            opening.add_done_callback(_heard)
+            await asyncio.wait([opening])
+            await self._loop.run_in_executor(workers, self._port.close)
+            workers.shutdown(wait=False)
+            raise
         except DriveError:
             workers.shutdown(wait=False)
             raise
