@@ -11,6 +11,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import NoReturn, TypeVar
 
@@ -253,7 +254,9 @@ class SdoChannel:
         except Empty:
             if not answers:
                 self._unanswered.add(_PROBE[1:4])
-            self._end_segments(answers)
+            # Without the adapter there is nothing to abort, and other nodes must still be released.
+            with suppress(DriveError):
+                self._end_segments(answers)
             return answers
         finally:
             self._turn.release()
