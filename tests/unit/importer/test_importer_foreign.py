@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from importer_samples import GOOD_EDS
 
 from profiles.importer import (
@@ -45,3 +46,97 @@ def test_defaults_with_a_remark_behind_them() -> None:
 def test_bit_rates_with_a_remark_behind_them() -> None:
     data = GOOD_EDS.replace("[DeviceInfo]\n", "[DeviceInfo]\nBaudRate_500=1 ; yes\n")
     assert import_file(data.encode(), "d.eds").profile.links[0].baudrates == (500_000,)
+
+
+MAPPED = """
+[1401]
+ParameterName=RPDO
+ObjectType=0x9
+SubNumber=3
+[{com}0]
+ParameterName=n
+DataType=5
+AccessType=ro
+DefaultValue=2
+[{com}1]
+ParameterName=COB-ID
+DataType=7
+AccessType=ro
+DefaultValue=$NODEID+0x300
+[{com}2]
+ParameterName=type
+DataType=5
+AccessType=rw
+DefaultValue=1
+[1601]
+ParameterName=Map
+ObjectType=0x9
+SubNumber=3
+[{map}0]
+ParameterName=n
+DataType=5
+AccessType=ro
+DefaultValue=1
+[{map}1]
+ParameterName=1
+DataType=7
+AccessType=ro
+DefaultValue=0x60400010
+[{map}2]
+ParameterName=2
+DataType=7
+AccessType=ro
+DefaultValue=0x20100010
+"""
+
+
+@pytest.mark.parametrize(
+    ("com", "mapping"),
+    [("1401sub", "1601sub"), ("0x1401sub0", "0x1601sub0"), ("1401h Sub 0", "1601h Sub 0")],
+)
+def test_subindices_in_every_spelling_of_their_headings(com: str, mapping: str) -> None:
+    """Count and identifier of a PDO were found only under one spelling."""
+    text = GOOD_EDS + MAPPED.format(com=com, map=mapping)
+    pdo = import_file(text.encode(), "d.eds").profile.pdo
+    assert pdo is not None
+    first = next(each for each in pdo.sets if each.index == 0x1601)
+    assert first.entries == ("6040:00",)
+    assert first.identifier is not None
+    assert (first.identifier.cob_id, first.identifier.of_node) == (0x300, True)
+
+
+UNTYPED = """
+[2300]
+ParameterName=Blob
+ObjectType=0x7
+DataType=0x0099
+AccessType=ro
+PDOMapping=1
+[1A01]
+ParameterName=Map
+ObjectType=0x9
+SubNumber=3
+[1A01sub0]
+ParameterName=n
+DataType=5
+AccessType=ro
+DefaultValue=2
+[1A01sub1]
+ParameterName=1
+DataType=7
+AccessType=ro
+DefaultValue=0x23000010
+[1A01sub2]
+ParameterName=2
+DataType=7
+AccessType=ro
+DefaultValue=0x60410010
+"""
+
+
+def test_a_mapped_object_of_unknown_type_keeps_its_place() -> None:
+    """The status word behind it was expected two bytes earlier."""
+    pdo = import_file((GOOD_EDS + UNTYPED).encode(), "d.eds").profile.pdo
+    assert pdo is not None
+    first = next(each for each in pdo.sets if each.index == 0x1A01)
+    assert [(part.key, part.bits) for part in first.layout] == [(None, 16), ("6041:00", 16)]
