@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import math
+import struct
+
 import pytest
 from importer_samples import GOOD_EDS
 
+from profiles.export import show
 from profiles.importer import (
+    ImportReport,
+    build_profile,
+    describe_dictionary,
     import_file,
 )
+from profiles.importer.dictionary import DictionaryEntry
 
 REAL = """
 [2200]
@@ -140,3 +149,17 @@ def test_a_mapped_object_of_unknown_type_keeps_its_place() -> None:
     assert pdo is not None
     first = next(each for each in pdo.sets if each.index == 0x1A01)
     assert [(part.key, part.bits) for part in first.layout] == [(None, 16), ("6041:00", 16)]
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+def test_a_real_number_that_is_none_in_the_drives_own_dictionary(value: float) -> None:
+    """A drive may report no limit as infinity, and an unset default as NaN."""
+    data = struct.pack("<f", value)
+    entry = DictionaryEntry(
+        0x2000, 0, "Factor", 0x08, 32, 0x3F, default=data, minimum=data, maximum=data
+    )
+    report = ImportReport()
+    profile = build_profile(describe_dictionary([entry], name="ES4", report=report), report).profile
+    json.dumps(show(profile), allow_nan=False)
+    factor = profile.by_key["2000:00"]
+    assert (factor.default_raw, factor.min_raw, factor.max_raw) == (None, None, None)
