@@ -17,6 +17,7 @@ from profiles.importer import (
     import_file,
 )
 from profiles.importer.dictionary import DictionaryEntry
+from profiles.importer.esi_controller import read_controllers
 
 REAL = """
 [2200]
@@ -163,3 +164,34 @@ def test_a_real_number_that_is_none_in_the_drives_own_dictionary(value: float) -
     json.dumps(show(profile), allow_nan=False)
     factor = profile.by_key["2000:00"]
     assert (factor.default_raw, factor.min_raw, factor.max_raw) == (None, None, None)
+
+
+def controller(sync_managers: str, clock: str) -> bytes:
+    return (
+        "<EtherCATInfo><Vendor><Id>#x0B95</Id></Vendor><Descriptions><Devices><Device>"
+        f'<Type ProductCode="#xA001" RevisionNo="#x2">A</Type>{sync_managers}'
+        f"<Dc><OpMode><Name>DC</Name>{clock}</OpMode></Dc>"
+        "</Device></Devices></Descriptions></EtherCATInfo>"
+    ).encode()
+
+
+MANAGERS = (
+    '<Sm StartAddress="#x1000" ControlByte="#x26" DefaultSize="256">{}</Sm>'
+    '<Sm StartAddress="#x1400" ControlByte="#x22" DefaultSize="256">{}</Sm>'
+)
+DRIVE = (0x0B95, 0xA001, 2)
+
+
+def test_an_eni_gets_the_clock_that_the_profile_of_the_same_file_has() -> None:
+    """``0300`` became 300 (012Ch), and a shift before SYNC0 became none."""
+    clock = "<AssignActivate>0300</AssignActivate><ShiftTimeSync0>-250000</ShiftTimeSync0>"
+    data = controller(MANAGERS.format("MBoxOut", "MBoxIn"), clock)
+    found = read_controllers([(data, "a.xml")], [DRIVE])[0]
+    assert (found.assign_activate, found.shift_ns) == (0x0300, -250_000)
+
+
+@pytest.mark.parametrize("names", [("MbxOut", "MbxIn"), ("Mbox Out", "Mbox In"), ("", "")])
+def test_an_eni_knows_mailboxes_as_the_profile_does(names: tuple[str, str]) -> None:
+    data = controller(MANAGERS.format(*names), "<AssignActivate>#x0300</AssignActivate>")
+    found = read_controllers([(data, "a.xml")], [DRIVE])[0]
+    assert [each.kind for each in found.sync_managers] == ["mailbox_out", "mailbox_in"]
