@@ -195,3 +195,25 @@ def test_an_eni_knows_mailboxes_as_the_profile_does(names: tuple[str, str]) -> N
     data = controller(MANAGERS.format(*names), "<AssignActivate>#x0300</AssignActivate>")
     found = read_controllers([(data, "a.xml")], [DRIVE])[0]
     assert [each.kind for each in found.sync_managers] == ["mailbox_out", "mailbox_in"]
+
+
+MODULES = """<EtherCATInfo><Vendor><Id>1</Id></Vendor><Descriptions><Devices><Device>
+<Type ProductCode="#x1" RevisionNo="#x1">A</Type>
+<Slots DownloadModuleIdentList="1" SlotIndexIncrement="#x800" SlotPdoIncrement="#x10">
+<Slot><ModuleIdent Default="1">#x11</ModuleIdent></Slot>
+<Slot><ModuleIdent>#x11</ModuleIdent></Slot>
+<Slot><ModuleIdent Default="1">#x22</ModuleIdent></Slot>
+<Slot><ModuleIdent>#x22</ModuleIdent></Slot>
+</Slots><Mailbox><CoE/></Mailbox></Device></Devices><Modules>
+<Module><Type ModuleIdent="#x11">M</Type><Profile><Dictionary><Objects><Object>
+<Index DependOnSlot="1">#x6040</Index><Name>Controlword</Name><Type>UINT</Type>
+<BitSize>16</BitSize></Object></Objects></Dictionary></Profile></Module>
+<Module><Type ModuleIdent="#x22">N</Type></Module>
+</Modules></Descriptions></EtherCATInfo>"""
+
+
+def test_an_empty_slot_has_its_place_in_the_list_of_modules() -> None:
+    """ETG.5001: subindex n of F030h is slot n; the module behind an empty slot moved up."""
+    rules = import_file(MODULES.encode(), "a.xml").profile.bring_up
+    assert rules is not None
+    assert rules.init_commands[0].data == struct.pack("<H3I", 3, 0x11, 0, 0x22).hex().upper()
