@@ -15,6 +15,7 @@ from profiles.importer import (
     build_profile,
     describe_dictionary,
     import_file,
+    read_dcf_values,
 )
 from profiles.importer.dictionary import DictionaryEntry
 from profiles.importer.esi_controller import read_controllers
@@ -217,3 +218,14 @@ def test_an_empty_slot_has_its_place_in_the_list_of_modules() -> None:
     rules = import_file(MODULES.encode(), "a.xml").profile.bring_up
     assert rules is not None
     assert rules.init_commands[0].data == struct.pack("<H3I", 3, 0x11, 0, 0x22).hex().upper()
+
+
+def test_values_of_a_dcf_with_absurd_subindices_and_texts() -> None:
+    text = (
+        "[FileInfo]\nx=1\n[DeviceComissioning]\nNodeID=5\n"
+        f"[2000Value]\nNrOfEntries=1\n{'1' * 5000}=7\n1=8\n"
+        "[2001]\nDataType=0x0009\nAccessType=rw\nParameterValue=NodeID\n"
+    )
+    report = ImportReport()
+    found = [(v.index, v.subindex, v.text) for v in read_dcf_values(text.encode(), "d", report)]
+    assert found == [(0x2000, 1, "8"), (0x2001, 0, "NodeID")]
