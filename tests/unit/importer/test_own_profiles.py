@@ -52,3 +52,11 @@ def test_texts_given_twice_under_keys_of_two_kinds() -> None:
     texts = dict.fromkeys(("a", "b"), "homing_methods:\n  1: {name: a}\n  b: {name: c}\n")
     with pytest.raises(ProfileError, match=r"profile.text-twice"):
         parse_overlay("mine/zh", texts)
+
+
+def test_a_name_pattern_that_is_no_expression_is_named_when_it_is_loaded() -> None:
+    """It ended the search for the profiles of every drive that was found."""
+    text = profile_yaml(import_file(GOOD_EDS.encode(), "g.eds").profile)
+    text = text.replace("identity:\n", "identity:\n  name_patterns: ['servo (']\n")
+    with pytest.raises(ProfileError, match=r"name_patterns.*unterminated"):
+        parse_profile({"profile.yaml": text})
