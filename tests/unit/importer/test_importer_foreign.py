@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from datetime import datetime
 
 import pytest
 from importer_samples import GOOD_EDS
@@ -14,11 +15,13 @@ from profiles.importer import (
     ImportReport,
     build_profile,
     describe_dictionary,
+    export_dcf,
     import_file,
     read_dcf_values,
 )
 from profiles.importer.dictionary import DictionaryEntry
 from profiles.importer.esi_controller import read_controllers
+from profiles.loader import load_profile
 
 REAL = """
 [2200]
@@ -229,3 +232,17 @@ def test_values_of_a_dcf_with_absurd_subindices_and_texts() -> None:
     report = ImportReport()
     found = [(v.index, v.subindex, v.text) for v in read_dcf_values(text.encode(), "d", report)]
     assert found == [(0x2000, 1, "8"), (0x2001, 0, "NodeID")]
+
+
+def test_a_dcf_holds_the_number_of_mapped_objects() -> None:
+    """1600h:00 can be written, and was in neither the file nor the count of what it lacks."""
+    profile = load_profile("ds_c")
+    values = {"1600:00": 2, "1600:01": 0x60400010, "1600:02": 0x607A0020}
+    text = export_dcf(profile, values, datetime(2026, 1, 2), file_name="a.dcf")
+    found = read_dcf_values(text.encode(), "a.dcf", ImportReport())
+    keys = {f"{v.index:04X}:{v.subindex:02X}": int(v.text, 0) for v in found}
+    assert keys == values
+    section = text.partition("[1600sub0]")[2].partition("[")[0]
+    assert "AccessType=rw\r\n" in section
+    assert "DataType=0x0005\r\n" in section
+    assert text.count("[1600sub0]") == 1
