@@ -13,7 +13,7 @@ from drivers.canopen import sdo
 from drivers.canopen.channel import SdoChannel
 from drivers.canopen.link import CanopenLink
 from drivers.canopen.scanning import probe
-from drivers.errors import LinkLost, ProtocolError
+from drivers.errors import LinkLost, LinkTimeout, ProtocolError
 
 
 def test_a_lost_adapter_leaves_no_node_occupied() -> None:
@@ -84,3 +84,44 @@ async def test_an_opening_that_is_cancelled_leaves_no_adapter_open() -> None:
         await opening
     assert closed == [True]
     await link.close()
+
+
+def test_a_node_that_is_silent_for_long_is_silent_and_no_defect() -> None:
+    """After 262 time-outs (two minutes without power) each access was an internal error.
+
+    It stayed one when the node was back, and a stop was no longer sent.
+    """
+    sent: list[bytes] = []
+    channel = SdoChannel(5, sent.append)
+    for _ in range(600):
+        with pytest.raises(LinkTimeout):
+            channel.read(0x6041, 0, 0.0001)
+    sent.clear()
+    with pytest.raises(LinkTimeout):
+        channel.write(0x6040, 0, b"\x02\0", 0.0001, at_any_rate=True)
+    assert sent[-1] == bytes.fromhex("2b40600002000000")
+
+    def back(request: bytes) -> None:
+        if request[0] == 0x40:
+            missing = request[1:4] != b"\x41\x60\x00"
+            data = bytes.fromhex("00000206" if missing else "37020000")
+            channel.deliver(bytes([0x80 if missing else 0x4B]) + request[1:4] + data)
+
+    channel._send = back
+    assert channel.read(0x6041, 0, 1.0) == b"\x37\x02"
+
+
+def test_the_request_that_shows_a_node_is_back_is_the_oldest_possible() -> None:
+    """Of 255 requests, so that only an answer as old could be taken for its own."""
+    requests: list[bytes] = []
+
+    def send(data: bytes) -> None:
+        if data[0] == 0x40:
+            requests.append(data[1:4])
+
+    channel = SdoChannel(5, send)
+    for _ in range(1000):
+        with pytest.raises(LinkTimeout):
+            channel.read(0x6041, 0, 0.0001)
+    last = requests[-600:]
+    assert all(last[n] not in last[max(n - 254, 0) : n] for n in range(600))
