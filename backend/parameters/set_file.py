@@ -213,7 +213,7 @@ def _keys(table: object, field: str) -> tuple[str, ...]:
 
 def _number(table: dict[str, Any], field: str) -> int | None:
     value = table.get(field)
-    # The database holds signed 64 bits; identity objects have 32 (CiA 301 clause 7.5.2.19).
+    # The database holds signed 64 bits; identity objects have 32 (CiA 301 clause 7.5.2.21).
     known = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 63
     return value if known else None
 
