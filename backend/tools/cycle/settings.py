@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 class CycleSettings(BaseModel):
     """How long to read, or which recording to use; and catalogue data of motor and drive."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     duration_s: float = Field(
         default=60.0, ge=2, le=3600, description="how long the drive is read, in s"
