@@ -181,7 +181,10 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     version = content.get("version")
     if version != VERSION:
         raise BadSet(
-            "sets.format-version-program-reads", name=name, version=version, other_version=VERSION
+            "sets.format-version-program-reads",
+            name=name,
+            version=version if isinstance(version, (int, str)) else repr(version),
+            other_version=VERSION,
         )
     if "end" not in content:
         raise BadSet("sets.truncated-end-missing", name=name)
@@ -190,13 +193,15 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     if not isinstance(rows, list):
         raise BadSet("sets.parameter-rows-missing", name=name)
     saved = about.get("saved")
+    if not isinstance(saved, datetime) or not 1 < saved.year < 9999:
+        saved = None  # at the ends of the calendar, some time zone cannot express it
     return ParameterSet(
         profile=str(identity.get("profile", "")),
         drive_name=str(identity.get("drive", "")),
         serial=_number(identity, "serial"),
         firmware=str(identity.get("firmware", "")),
         author=str(about.get("author", "")),
-        saved=saved if isinstance(saved, datetime) else None,
+        saved=saved,
         notes=str(about.get("notes", "")),
         rows=tuple(_row(row, number) for number, row in enumerate(rows, 1)),
         vendor_id=_number(identity, "vendor_id"),
