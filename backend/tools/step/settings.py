@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from backend.tools.step.evaluate import StepSettings
 from backend.tools.tool import Option, ToolSettings
+from drivers.texts.message import Unsuitable, text
 
 
 class StepRequest(ToolSettings):
@@ -31,7 +32,7 @@ class StepRequest(ToolSettings):
     @model_validator(mode="after")
     def _some_way(self) -> StepRequest:
         if self.size == 0.0:
-            raise ValueError("size must not be 0")
+            raise Unsuitable(text("step.no-size"))
         return self
 
     @property
