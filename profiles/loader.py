@@ -31,6 +31,8 @@ STANDARD = "generic402"
 _HERE = Path(__file__).parent
 #: libyaml's loader if PyYAML was built with it; ten times as fast.
 _SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+#: ValueError: an impossible date or an endless number. RecursionError: deeply nested.
+YAML_ERRORS = (yaml.YAMLError, ValueError, RecursionError)
 
 
 #: Filled in from the motion rules, see `profiles.motion.classify`.
@@ -138,7 +140,7 @@ def parse_profile(texts: dict[str, str]) -> Profile:
     for name, text in texts.items():
         try:
             data = yaml.load(text, Loader=_SafeLoader)  # noqa: S506 - both loaders are safe
-        except yaml.YAMLError as error:
+        except YAML_ERRORS as error:
             raise ProfileError("profile.no-yaml", file=name, detail=str(error)) from error
         if not isinstance(data, dict):
             raise ProfileError("profile.no-mapping", file=name)
@@ -173,14 +175,14 @@ _NOTES_ONCE = frozenset({
 
 def _move_notes(merged: dict[str, Any]) -> None:
     """Convert a profile of the user's own from version 0.2.0 to the present form."""
-    quirks = merged.get("quirks")
-    if not isinstance(quirks, list):
+    quirks, notes = merged.get("quirks"), merged.get("notes") or []
+    if not isinstance(quirks, list) or not isinstance(notes, list):
         return
     moved = [q for q in quirks if isinstance(q, dict) and q.get("kind") in _NOTES_ONCE]
     if moved:
         merged["quirks"] = [q for q in quirks if q not in moved]
         merged["notes"] = [
-            *merged.get("notes", ()),
+            *notes,
             *({k: q[k] for k in ("key", "help", "source") if k in q} for q in moved),
         ]
 

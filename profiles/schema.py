@@ -7,11 +7,12 @@ only for something a manual documents.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from functools import cached_property
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from profiles.bring_up import BringUp
 from profiles.functions import Functions, referenced_keys
@@ -537,6 +538,16 @@ class Identity(Frozen):
     )
     source: str = ""
     notes: str = ""
+
+    @field_validator("name_patterns")
+    @classmethod
+    def _patterns_can_be_read(cls, patterns: tuple[str, ...]) -> tuple[str, ...]:
+        for pattern in patterns:
+            try:
+                re.compile(pattern)
+            except re.error as error:
+                raise ValueError(f"{pattern!r} is no regular expression: {error}") from error
+        return patterns
 
 
 class Quirk(Frozen):

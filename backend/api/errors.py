@@ -27,6 +27,7 @@ from drivers.errors import (
     internal_error,
 )
 from drivers.texts.message import Param, Text, as_text, language, text
+from drivers.texts.validation import refusal_of
 
 log = logging.getLogger(__name__)
 
@@ -190,17 +191,18 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def bad_request(_request: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        advice = text("api.see-interface")
+        refusal, advice = refusal_of(first), text("api.see-interface")
         return answer(
             Problem(
                 type="urn:servodeck:bad-request",
                 title=TITLES["bad-request"],
                 status=422,
-                detail=f"{place}: {first['msg']}",
-                parameter=place,
+                detail=refusal.words(language()),
+                parameter=".".join(str(part) for part in first["loc"]),
                 value=_scalar(jsonable_encoder(first.get("input"), custom_encoder={bytes: repr})),
                 remedy=advice.words(language()),
+                code=refusal.code,
+                params=message_of(refusal).params,
                 advice=message_of(advice),
             )
         )

@@ -20,6 +20,7 @@ from backend.functions.regeneration import braking as braking_of
 from backend.scales.gear_calculator import Mechanics, plan_gear
 from drivers.errors import OutOfRange
 from drivers.texts import limits as limit_texts
+from drivers.texts.validation import reason_of
 from profiles import load_profile
 
 _UNKNOWN = "not in the profile"
@@ -127,7 +128,7 @@ def gear_command(
             value=first["input"],
             first=first["loc"][0],
             other_first=first["input"],
-            first3=first["msg"],
+            first3=reason_of(first),
         ) from error
     if station is None:
         _show(of_plan(plan_gear(load_profile(drive), mechanics, None)))

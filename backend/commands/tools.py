@@ -25,6 +25,7 @@ from backend.commands.session import progress
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
 from drivers.texts.message import language, text
+from drivers.texts.validation import reason_of
 
 _WHERE: dict[str, tuple[Any, object]] = {
     "url": (measure.Url, None),
@@ -174,15 +175,16 @@ def _settings(tool: AnyTool, given: dict[str, Any]) -> Any:
             continue
         ends = [given[f"{name}_{number}"] for number in range(len(option.names))]
         if None in ends and ends != [None, None]:
-            both = " and ".join(option.names)
-            raise typer.BadParameter(f"give both {both}, or none of them")
+            both = text("command.give-both", first=option.names[0], second=option.names[1])
+            raise typer.BadParameter(both.words(language()))
         values[name] = None if None in ends else tuple(ends)
     try:
         return tool.settings.model_validate(values)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or tool.kind
-        raise typer.BadParameter(f"{where}: {first['msg']}") from error
+        refused = text("input.refused", place=where, reason=reason_of(first))
+        raise typer.BadParameter(refused.words(language())) from error
 
 
 inertia = command_of(BY_KIND["inertia"])

@@ -19,6 +19,7 @@ from sqlalchemy.orm import selectinload
 from backend.library import rows
 from backend.library.entries import Addition, Kind
 from backend.store.database import Store
+from backend.store.files import files_of, shown_name
 from backend.store.library_tables import Item, Tag
 from drivers.errors import NotAllowed
 from drivers.texts.answers import sentence
@@ -49,19 +50,18 @@ class Folder:
     def stamps(self) -> dict[str, str]:
         """Names of its files, each with a stamp that changes with the file."""
         found: dict[str, str] = {}
-        for suffix in self.suffixes:
-            for path in self.path.glob(f"*{suffix}"):
-                if path.name.startswith("."):
-                    continue
-                try:
-                    status = path.stat()
-                    stamp = f"{status.st_mtime_ns}:{status.st_size}"
-                    sidecar = path.with_name(path.name + self.sidecar)
-                    if self.sidecar and sidecar.exists():
-                        stamp += f":{sidecar.stat().st_mtime_ns}"
-                except FileNotFoundError:
-                    continue  # deleted at this moment
-                found[path.name] = stamp
+        for path in files_of(self.path, *self.suffixes):
+            if shown_name(path) != path.name:
+                continue  # no database contains a name that is not UTF-8
+            try:
+                status = path.stat()
+                stamp = f"{status.st_mtime_ns}:{status.st_size}"
+                sidecar = path.with_name(path.name + self.sidecar)
+                if self.sidecar and sidecar.exists():
+                    stamp += f":{sidecar.stat().st_mtime_ns}"
+            except FileNotFoundError:
+                continue  # deleted at this moment
+            found[path.name] = stamp
         return found
 
 

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 import backend
 from backend.drive.drive import Drive
-from backend.store.files import checked_name, write_atomically
+from backend.store.files import checked_name, files_of, shown_name, write_atomically
 from drivers.errors import NotAllowed
 from profiles.schema import Profile
 
@@ -187,6 +187,10 @@ def _head(text: npt.NDArray[np.generic], name: str) -> Head:
     if int(meta["version"]) > VERSION:
         raise BadMeasurement("library.written-newer-version", value=name)
     saved = datetime.fromisoformat(meta["saved"])
+    if not 1 < saved.year < 9999:
+        raise ValueError("no date")  # some time zone cannot express it
+    # Half of a surrogate pair, which JSON may contain and no answer or database can.
+    json.dumps(meta, ensure_ascii=False).encode()
     return Head(str(meta["kind"]), saved, str(meta["drive"]), meta)
 
 
@@ -262,8 +266,7 @@ class MeasurementStore:
 
     def names(self) -> list[str]:
         """File names, newest first."""
-        found = sorted((p.name for p in self.folder.glob(f"*{SUFFIX}")), reverse=True)
-        return [name for name in found if not name.startswith(".")]
+        return sorted(map(shown_name, files_of(self.folder, SUFFIX)), reverse=True)
 
     def read(self, name: str) -> bytes:
         """Contents of a file.

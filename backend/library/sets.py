@@ -10,7 +10,7 @@ from backend.library.catalogue import Library
 from backend.library.entries import Addition, AxisIdentity, Entry
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import SUFFIX, BadSet, ParameterSet
-from backend.store.files import StorageFailed, checked_name
+from backend.store.files import StorageFailed, checked_name, files_of, shown_name
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 
@@ -122,23 +122,31 @@ class LibrarySets:
         again, which makes no new version.
         """
         problems: dict[str, Text] = {}
-        for path in sorted(self.folder.glob(f"*{SUFFIX}"), key=lambda p: p.stat().st_mtime):
-            if path.name.startswith("."):
-                continue
+        for path in sorted(files_of(self.folder, SUFFIX), key=_modified):
+            shown = shown_name(path)
             try:
                 data = path.read_bytes()
-                name = checked_name(path.name, SUFFIX)
+                name = checked_name(shown, SUFFIX)
                 self.library.add("set", name, data, addition_of(parameter_set.parse(data, name)))
                 _put_aside(path)
             except StorageFailed:
                 raise
             except (BadSet, NotAllowed) as error:
-                problems[path.name] = error.text
+                problems[shown] = error.text
+            except FileNotFoundError:
+                continue  # imported by another request at this moment
             except OSError as error:
-                problems[path.name] = text(
-                    "library.set-cannot-be-read", name=path.name, cause=error.strerror
+                problems[shown] = text(
+                    "library.set-cannot-be-read", name=shown, cause=error.strerror
                 )
         return problems
+
+
+def _modified(path: Path) -> float:
+    try:
+        return path.stat().st_mtime
+    except OSError:
+        return 0.0  # deleted at this moment
 
 
 def _put_aside(path: Path) -> None:

@@ -181,7 +181,10 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     version = content.get("version")
     if version != VERSION:
         raise BadSet(
-            "sets.format-version-program-reads", name=name, version=version, other_version=VERSION
+            "sets.format-version-program-reads",
+            name=name,
+            version=version if isinstance(version, (int, str)) else repr(version),
+            other_version=VERSION,
         )
     if "end" not in content:
         raise BadSet("sets.truncated-end-missing", name=name)
@@ -190,13 +193,15 @@ def parse(data: bytes, name: str = "the file") -> ParameterSet:
     if not isinstance(rows, list):
         raise BadSet("sets.parameter-rows-missing", name=name)
     saved = about.get("saved")
+    if not isinstance(saved, datetime) or not 1 < saved.year < 9999:
+        saved = None  # at the ends of the calendar, some time zone cannot express it
     return ParameterSet(
         profile=str(identity.get("profile", "")),
         drive_name=str(identity.get("drive", "")),
         serial=_number(identity, "serial"),
         firmware=str(identity.get("firmware", "")),
         author=str(about.get("author", "")),
-        saved=saved if isinstance(saved, datetime) else None,
+        saved=saved,
         notes=str(about.get("notes", "")),
         rows=tuple(_row(row, number) for number, row in enumerate(rows, 1)),
         vendor_id=_number(identity, "vendor_id"),
@@ -213,7 +218,7 @@ def _keys(table: object, field: str) -> tuple[str, ...]:
 
 def _number(table: dict[str, Any], field: str) -> int | None:
     value = table.get(field)
-    # The database holds signed 64 bits; identity objects have 32 (CiA 301 clause 7.5.2.19).
+    # The database holds signed 64 bits; identity objects have 32 (CiA 301 clause 7.5.2.21).
     known = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 1 << 63
     return value if known else None
 

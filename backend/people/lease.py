@@ -217,7 +217,8 @@ class Leases:
             if holder.until is not None and now >= holder.until and not moves(drive):
                 self._notify(holder.connection, drive, "expired", "")
                 if holder.giver is None:
-                    self._free(drive)
+                    # The giver is gone: whoever is waiting for control gets it.
+                    self.give(drive, holder.connection)
                 else:
                     self._return(drive, holder)
         for drive, asked in list(self._asked.items()):
@@ -235,8 +236,11 @@ class Leases:
         self._notify(giver.connection, drive, "returned", holder.person)
 
     def _set(self, drive: str, holder: Holder) -> Holder:
+        """Make somebody the holder; whoever else was asking is told that it is refused."""
         self._holders[drive] = holder
-        self._asked.pop(drive, None)
+        asked = self._asked.pop(drive, None)
+        if asked is not None and asked.connection != holder.connection:
+            self._notify(asked.connection, drive, "refused", holder.person)
         self._changed(drive)
         return holder
 

@@ -138,9 +138,19 @@ class BlockHead:
 
 
 def block_head(payload: bytes) -> BlockHead:
-    """The fixed part of a samples payload; needs its first ``BLOCK.size`` bytes only."""
+    """The fixed part of a samples payload; needs its first ``BLOCK.size`` bytes only.
+
+    Raises:
+        ValueError: the payload is shorter.
+    """
+    _require_head(payload)
     stream, _, rows, columns, _, lost, t0_s, dt_s = BLOCK.unpack(payload[: BLOCK.size])
     return BlockHead(stream, rows, columns, lost, t0_s, dt_s)
+
+
+def _require_head(payload: bytes) -> None:
+    if len(payload) < BLOCK.size:
+        raise ValueError(f"samples chunk of {len(payload)} bytes")
 
 
 def read_samples(payload: bytes) -> Samples:
@@ -149,6 +159,7 @@ def read_samples(payload: bytes) -> Samples:
     Raises:
         ValueError: the arrays do not fill the payload (written by another version).
     """
+    _require_head(payload)
     stream, flags, rows, columns, sequence, lost, t0_s, dt_s = BLOCK.unpack(payload[: BLOCK.size])
     times_bytes = 8 * rows if flags & _TIMES else 0
     valid_bytes = rows if flags & _VALID else 0

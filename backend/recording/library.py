@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import time
 from collections.abc import Iterable
@@ -11,7 +12,7 @@ from typing import Any
 
 from backend.recording.chunks import SUFFIX
 from backend.recording.reader import BadRecording, RecordingReader, Summary
-from backend.store.files import checked_name, write_atomically
+from backend.store.files import checked_name, files_of, shown_name, write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text
 
@@ -119,12 +120,30 @@ class RecordingLibrary:
         words = search.lower().split()
         skip = set(busy)
         found = [
-            self.describe(path.name)
-            for path in self.folder.glob(f"*{SUFFIX}")
-            if not path.name.startswith(".") and path.name not in skip
+            self._listed(path) for path in files_of(self.folder, SUFFIX) if path.name not in skip
         ]
-        fitting = [s for s in found if all(word in s.words() for word in words)]
+        fitting = [s for s in found if s is not None and all(word in s.words() for word in words)]
         return sorted(fitting, key=lambda s: -s.modified)
+
+    def _listed(self, path: Path) -> Stored | None:
+        """One row of the list; a file that was deleted in the meantime has none.
+
+        A file that cannot be opened under its name, as one that was copied by hand, is listed with
+        its problem.
+        """
+        name = shown_name(path)
+        try:
+            return self.describe(name)
+        except FileNotFoundError:
+            return None
+        except NotAllowed as error:
+            try:
+                status = path.stat()
+            except OSError:
+                return None
+            return Stored(
+                name, None, Remarks(), status.st_mtime, status.st_size, (), problem=error.text
+            )
 
     def describe(self, name: str) -> Stored:
         """One recording.
@@ -196,26 +215,37 @@ class RecordingLibrary:
         now = time.time() if now is None else now
         skip = set(busy)
         rows = []
-        for path in self.folder.glob(f"*{SUFFIX}"):
-            if path.name.startswith(".") or path.name in skip:
-                continue
-            size = path.stat().st_size + sum(
-                e.stat().st_size
-                for kind in EXPORTS
-                if (e := self.export_path(path.name, kind)).is_file()
-            )
-            rows.append((path.stat().st_mtime, path.name, size, self._remarks(path).kept))
+        for path in files_of(self.folder, SUFFIX):
+            # A file whose name is not one of a recording was put there by hand, and stays.
+            if path.name not in skip and self._is_named(path):
+                with contextlib.suppress(FileNotFoundError):  # deleted at this moment
+                    rows.append((path.stat().st_mtime, path.name, self._size(path)))
         total = sum(row[2] for row in rows)
         gone = []
-        for modified, name, size, kept in sorted(rows):
+        for modified, name, size in sorted(rows):
             days, most = self.retention.keep_days, self.retention.max_total_bytes
             old = days is not None and now - modified > days * 86400
-            if kept or not (old or (most is not None and total > most)):
+            if not (old or (most is not None and total > most)):
                 continue
-            self.delete(name)
+            path = self.folder / name
+            if self._remarks(path).kept:
+                continue
+            if path.exists():
+                self.delete(name)
+                gone.append(name)
             total -= size
-            gone.append(name)
         return gone
+
+    def _is_named(self, path: Path) -> bool:
+        try:
+            return self.path(path.name).name == path.name
+        except NotAllowed:
+            return False
+
+    def _size(self, path: Path) -> int:
+        """Size of a recording with its exports."""
+        exports = (self.export_path(path.name, kind) for kind in EXPORTS)
+        return path.stat().st_size + sum(e.stat().st_size for e in exports if e.is_file())
 
     def _remarks(self, path: Path) -> Remarks:
         content = _read_json(path.with_name(path.name + _NOTES))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
@@ -116,7 +118,10 @@ class RecordingReader:
             self.channels = _channels(self.header)
             clock = self.header["clock"]
             self.clock = Clock(float(clock["sample_s"]), float(clock["epoch_s"]))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            _require_usable(self.header, self.clock)
+        except (
+            KeyError, TypeError, ValueError, AttributeError, OverflowError, RecursionError, OSError,
+        ) as error:  # fmt: skip
             self._file.close()
             raise BadRecording(
                 "recording.not-recording-beginning-damaged", value=path.name
@@ -161,7 +166,7 @@ class RecordingReader:
         """All blocks of samples, in the order of writing."""
         for kind, payload in self.chunks():
             if kind == chunks.SAMPLES:
-                yield chunks.read_samples(payload)
+                yield self._samples(payload)
 
     def block(self, ref: BlockRef) -> Samples:
         """Read one block of samples.
@@ -173,7 +178,15 @@ class RecordingReader:
         chunk = self._chunk()
         if chunk is None:
             raise BadRecording("recording.changed-read", value=ref.offset, path=self.path.name)
-        return chunks.read_samples(chunk[1])
+        return self._samples(chunk[1])
+
+    def _samples(self, payload: bytes) -> Samples:
+        try:
+            return chunks.read_samples(payload)
+        except ValueError as error:
+            raise BadRecording(
+                "recording.not-recording-beginning-damaged", value=self.path.name
+            ) from error
 
     def events(self) -> list[dict[str, Any]]:
         """All events: parameter changes, faults, log lines, the trigger."""
@@ -194,10 +207,11 @@ class RecordingReader:
             kind, payload = chunk
             if kind != chunks.SAMPLES:
                 continue
+            block = self._samples(payload)
             head = chunks.block_head(payload)
             if not head.rows:
                 continue
-            last = float(chunks.read_samples(payload).times_s[-1])
+            last = float(block.times_s[-1])
             found.refs.append(BlockRef(offset, head.stream, head.rows, head.t0_s, last))
             found.samples += head.rows
             found.lost += head.lost
@@ -246,6 +260,26 @@ class RecordingReader:
             last_s=scan.last_s if scan else facts.get("last_s"),
             bytes=self.path.stat().st_size,
         )
+
+
+def _require_usable(header: dict[str, Any], clock: Clock) -> None:
+    """Check the parts of a header that lists show.
+
+    Raises:
+        ValueError, TypeError, OverflowError, OSError: a part cannot be shown.
+    """
+    if not math.isfinite(clock.sample_s):
+        raise ValueError("no time of the samples")
+    for moment in (clock.epoch_s, float(header.get("created", 0.0))):
+        # A year is left for the samples and for time zones.
+        if not 1 < datetime.fromtimestamp(moment, UTC).year < 9999:
+            raise ValueError("no date")
+    if not all(isinstance(header.get(name, []), list) for name in ("axes", "tags")):
+        raise TypeError("no list")
+    if not all(isinstance(axis, dict) for axis in header.get("axes", [])):
+        raise TypeError("no axis")
+    # Half of a surrogate pair, which JSON may contain and no answer or database can.
+    json.dumps(header, ensure_ascii=False).encode()
 
 
 def _channels(header: dict[str, Any]) -> tuple[Channel, ...]:

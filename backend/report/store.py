@@ -11,7 +11,7 @@ from backend.report.compose import compose
 from backend.report.document import Language
 from backend.report.facts import Facts
 from backend.report.html import render_html
-from backend.store.files import checked_name, write_atomically
+from backend.store.files import checked_name, files_of, shown_name, write_atomically
 from drivers.errors import NotAllowed
 
 Format = Literal["html", "pdf"]
@@ -58,8 +58,9 @@ class ReportStore:
 
     def names(self) -> list[str]:
         """File names, newest first."""
-        found = [p.name for form in FORMATS for p in self.folder.glob(f"*.{form}")]
-        return sorted((name for name in found if not name.startswith(".")), reverse=True)
+        found = files_of(self.folder, *(f".{form}" for form in FORMATS))
+        # One whose name is not UTF-8 has no address by which it could be read.
+        return sorted((p.name for p in found if shown_name(p) == p.name), reverse=True)
 
     def read(self, name: str) -> bytes:
         """Contents of a file.

@@ -15,6 +15,7 @@ from backend.tools.measuring.numbers import NONE, significant
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Chart, Grid, Interval, Section, ToolResult
 from backend.tools.tool import Note as ToolNote
+from drivers.texts.validation import refusal_of
 
 _COLORS = ("#1a5c94", "#c2571a")
 
@@ -38,7 +39,7 @@ def result_of(tool: object, result: dict[str, object]) -> ToolResult:
         found: ToolResult = known.result.model_validate(result)
     except ValidationError as error:
         raise BadMeasurement(
-            "report.result-not-complete", tool=str(tool), cause=str(error)
+            "report.result-not-complete", tool=str(tool), cause=refusal_of(error.errors()[0])
         ) from error
     return found
 
@@ -55,7 +56,7 @@ def verdict_of(kept: object) -> VerdictInfo | None:
         return VerdictInfo.model_validate(kept)
     except ValidationError as error:
         raise BadMeasurement(
-            "report.result-not-complete", tool="autotune", cause=str(error)
+            "report.result-not-complete", tool="autotune", cause=refusal_of(error.errors()[0])
         ) from error
 
 

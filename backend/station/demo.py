@@ -21,6 +21,7 @@ from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Found, Link
 from drivers.texts.message import Text, text
+from drivers.texts.validation import reason_of
 from drivers.urls import link_for
 from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, BenchSpec, load_bench, write_bench
 from drivers.virtual.defects import DEFECT_WORDS
@@ -247,7 +248,7 @@ def mechanics_of(axis: AxisSpec) -> Mechanics | None:
             value=axis.name,
             path=axis.name,
             place=".".join(["moves", *(str(part) for part in first["loc"])]),
-            first=first["msg"],
+            first=reason_of(first),
         ) from error
 
 

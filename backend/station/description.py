@@ -30,7 +30,8 @@ IMPORT_LIMIT_MIB = 768
 #: Imports at the same time, of all users: each may use a processor and that memory.
 IMPORTS_AT_ONCE = 2
 _at_once: dict[asyncio.AbstractEventLoop, asyncio.Semaphore] = {}
-#: Objects 1021h "Store EDS" and 1022h "Store format"; 0: plain text (CiA 301 clause 7.5.2.19).
+#: Objects 1021h "Store EDS" and 1022h "Store format"; 0: plain text (CiA 301 clauses 7.5.2.24
+#: and 7.5.2.25).
 _STORED_EDS = Address(0x1021, 0, "OCTETS")
 _STORED_FORMAT = Address(0x1022, 0, "UINT16")
 

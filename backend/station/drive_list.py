@@ -10,7 +10,8 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from backend.store.files import write_atomically
-from drivers.texts.message import Text, prose, text
+from drivers.texts.message import Text, Unsuitable, prose, text
+from drivers.texts.validation import reason_of
 
 VERSION = 1
 
@@ -35,7 +36,7 @@ class SavedDrive:
 
     def __post_init__(self) -> None:
         if not self.ports:
-            raise ValueError("a drive needs at least one port")
+            raise Unsuitable(text("station.drive-without-port"))
 
 
 _DRIVE = TypeAdapter(SavedDrive)
@@ -77,7 +78,7 @@ class DriveList:
                         file=self._path.name,
                         number=number,
                         place=place,
-                        cause=prose(first["msg"]),
+                        cause=reason_of(first),
                     )
                 )
         return drives, problems

@@ -31,7 +31,7 @@ def match_profiles(kind: str, found: Found) -> list[Match]:
         if profile.link(kind) is None:
             continue
         identity = profile.identity
-        # Vendor 0 does not exist (CiA 301 clause 7.5.2.19): such a drive does not report its maker.
+        # Vendor 0 does not exist (CiA 301 clause 7.5.2.21): such a drive does not report its maker.
         if identity.vendor_id is not None and found.vendor_id:
             if identity.vendor_id != found.vendor_id:
                 continue

@@ -27,9 +27,24 @@ def checked_name(name: str, suffix: str) -> str:
         NotAllowed: the name is anything else.
     """
     stem = name.removesuffix(suffix)
-    if not _NAME.match(stem) or ".." in stem:
+    if not _NAME.fullmatch(stem) or ".." in stem:
         raise NotAllowed("store.not-file-name", value=name, limit=text("limit.file-name"))
     return stem + suffix
+
+
+def files_of(folder: Path, *suffixes: str) -> list[Path]:
+    """Files of a folder with one of these suffixes; no folders, dead links or hidden files."""
+    return [
+        path
+        for suffix in suffixes
+        for path in folder.glob(f"*{suffix}")
+        if not path.name.startswith(".") and path.is_file()
+    ]
+
+
+def shown_name(path: Path) -> str:
+    """Name of a file for lists and messages: what is not UTF-8 in it is replaced."""
+    return os.fsencode(path.name).decode("utf-8", "replace")
 
 
 def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:

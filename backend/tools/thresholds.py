@@ -867,6 +867,12 @@ class moves_go_back:
     """[ratio] Origin: 76c87fed with docs/tuning-accuracy.md."""
     ATTEMPTS = 3
     """[count] Moves home, until the axis is where it was. Origin: 76d84383."""
+    # FAR_REV, FAR: Farther away after these moves than the larger of these (turns, share of the
+    # travel), the axis has not come back.
+    FAR_REV = 0.05
+    """[rev] Origin: tests/virtual/tools/test_begins_at_home.py, within which an axis is back."""
+    FAR = 0.1
+    """[ratio] Origin: as FAR_REV; below the share of sweep_play.AWAY."""
     # MISSED_REV, MISSED: So much more is asked for at most, in turns and as a share of the travel.
     MISSED_REV = 0.3
     """[rev] Origin: 76c87fed with docs/tuning-accuracy.md."""

@@ -51,9 +51,12 @@ class Option:
 
 
 class ToolSettings(BaseModel):
-    """The motion envelope of every measurement: rev from the start, rpm, % of rated torque, s."""
+    """The motion envelope of every measurement: rev from the start, rpm, % of rated torque, s.
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    NaN is refused in every setting, as comparisons with a limit would not detect it.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     travel_limit: Annotated[float, Option(("--travel-rev",), 3.0)] = Field(
         gt=0, description="longest way from the start, in revolutions"

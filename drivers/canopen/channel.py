@@ -11,6 +11,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import NoReturn, TypeVar
 
@@ -182,14 +183,18 @@ class SdoChannel:
         for index, subindex in self._candidates():
             if sdo.multiplexer(index, subindex) not in self._unanswered:
                 return index, subindex
-        raise AssertionError("256 time-outs in a row use distinct subindices")
+        # A node without power: the one of 255 requests ago, whose answer does not come any more.
+        return self._next_missing()
 
     def _candidates(self) -> Iterator[tuple[int, int]]:
         yield from _BARRIERS
-        # The refusal of a missing subindex contains that subindex, so it can serve as the barrier.
         for _ in range(255):
-            self._tag = self._tag % 255 + 1
-            yield 0x1000, self._tag
+            yield self._next_missing()
+
+    def _next_missing(self) -> tuple[int, int]:
+        """Return a subindex that does not exist: its refusal contains it, as a barrier must."""
+        self._tag = self._tag % 255 + 1
+        return 0x1000, self._tag
 
     def _discard_strays(self) -> None:
         while not self._answers.empty():
@@ -253,7 +258,9 @@ class SdoChannel:
         except Empty:
             if not answers:
                 self._unanswered.add(_PROBE[1:4])
-            self._end_segments(answers)
+            # Without the adapter there is nothing to abort, and other nodes must still be released.
+            with suppress(DriveError):
+                self._end_segments(answers)
             return answers
         finally:
             self._turn.release()

@@ -20,6 +20,7 @@ from drivers.canopen.frames import Frame
 from drivers.canopen.images import CONTROL_WORD, Images
 from drivers.canopen.pdo import PdoPlan, plan_within_load
 from drivers.canopen.port import CanPort
+from drivers.canopen.sdo import fitted
 from drivers.canopen.synchronous import LoopClock, SyncLoop
 from drivers.canopen.trajectory import motion_of
 from drivers.canopen.url import CanUrl
@@ -435,7 +436,7 @@ class CanopenCyclic:
                 )
         self.unguarded = frozenset(unguarded)
         for key, slot in images.outputs.items():
-            data = self._read(*key)
+            data = fitted(self._read(*key), slot.size)
             if len(data) != slot.size:
                 raise NotAllowed(
                     "canopen.node-bytes-expected",

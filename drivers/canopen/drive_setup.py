@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 
 from drivers.canopen.fixed_pdo import FixedPdo
 from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
+from drivers.canopen.sdo import fitted
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.motion.interpolation import interpolation_period
 
@@ -56,12 +57,18 @@ class DriveSetup:
 
     def interpolate(self, station: int, cycle_s: float) -> None:
         """Write the time between setpoints (60C2h) to a drive that interpolates between them."""
+        begin = len(self._undo)
         try:
             value, exponent = interpolation_period(round(cycle_s * 1e9))
             self._change(station, SdoWrite(0x60C2, 1, bytes([value])))
-            self._change(station, SdoWrite(0x60C2, 2, exponent.to_bytes(1, "little", signed=True)))
+            power = exponent.to_bytes(1, "little", signed=True)
+            if fitted(self._read(station, 0x60C2, 2), 1) != power:
+                self._change(station, SdoWrite(0x60C2, 2, power))
         except (Rejected, NotAllowed):
-            return  # no interpolation, or not over this time: the drive keeps its own
+            # No interpolation, or not over this time: the drive keeps its own. The new value with
+            # the old exponent would be another time.
+            self._put_back(self._undo[begin:])
+            del self._undo[begin:]
 
     def unguard(self) -> None:
         """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
@@ -79,7 +86,7 @@ class DriveSetup:
         self._put_back(undo)
 
     def _change(self, station: int, write: SdoWrite) -> None:
-        before = self._read(station, write.index, write.subindex)
+        before = fitted(self._read(station, write.index, write.subindex), len(write.data))
         self._undo.append((station, SdoWrite(write.index, write.subindex, before)))
         try:
             self._write(station, write.index, write.subindex, write.data)
@@ -143,7 +150,7 @@ class DriveSetup:
                 held=", ".join(f"{word:08X}h" for word in held) or "0",
             )
         cob = int.from_bytes(self._read(station, pdo.communication, 1), "little")
-        kind = self._read(station, pdo.communication, 2)
+        kind = fitted(self._read(station, pdo.communication, 2), 1)
         wanted = pdo.cob_id | cob & _PDO_FLAGS
         synchronous = bytes([SYNCHRONOUS])
         if (cob, kind) == (wanted, synchronous):
@@ -186,8 +193,8 @@ class DriveSetup:
     def _remember(self, pdo: PdoPlan, cob: bytes) -> None:
         """Record the undo list, which runs from its end: invalid, then the mapping, then valid."""
         station = pdo.station
-        kind = self._read(station, pdo.communication, 2)
-        count = self._read(station, pdo.mapping, 0)
+        kind = fitted(self._read(station, pdo.communication, 2), 1)
+        count = fitted(self._read(station, pdo.mapping, 0), 1)
         entries = [self._read(station, pdo.mapping, n) for n in range(1, min(count[0], 8) + 1)]
         invalid = int.from_bytes(cob, "little") | INVALID
         before = [

@@ -16,6 +16,7 @@ from typing import TypeVar
 
 import can
 
+from drivers.canopen import sdo
 from drivers.canopen.adapter import open_bus
 from drivers.canopen.bus import BUS
 from drivers.canopen.channel import SdoChannel
@@ -119,8 +120,16 @@ class CanopenLink:
             return
         self._loop = asyncio.get_running_loop()
         workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="canopen")
+        opening = self._loop.run_in_executor(workers, self._port.open)
         try:
-            await self._loop.run_in_executor(workers, self._port.open)
+            await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            # The thread cannot be interrupted; what it opens would stay in use.
+            opening.add_done_callback(_heard)
+            await asyncio.wait([opening])
+            await self._loop.run_in_executor(workers, self._port.close)
+            workers.shutdown(wait=False)
+            raise
         except DriveError:
             workers.shutdown(wait=False)
             raise
@@ -312,7 +321,7 @@ class CanopenLink:
     def _read_now(self, station: int, address: Address) -> bytes:
         index, subindex = _object(address)
         data = self._sdo_read(station, index, subindex)
-        return _fit(data, size_of(address.type))
+        return sdo.fitted(data, size_of(address.type))
 
     def _sdo_read(self, station: int, index: int, subindex: int) -> bytes:
         self._in_use(station)
@@ -448,20 +457,6 @@ def _object(address: Address) -> tuple[int, int]:
     if address.index is None:
         raise NotAllowed("canopen.exists-over-modbus", parameter=str(address), address=str(address))
     return address.index, address.subindex
-
-
-def _fit(data: bytes, size: int | None) -> bytes:
-    """Cut ``data`` to ``size`` if only padding is removed.
-
-    Some drives send four bytes for every object, filled with zeros or with the sign.
-    """
-    if size is None or len(data) <= size:
-        return data
-    rest = data[size:]
-    sign = b"\xff" if data[size - 1] & 0x80 else b"\0"
-    if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
-        return data[:size]
-    return data
 
 
 def can_bus_of(link: Link | None) -> CanopenLink | None:

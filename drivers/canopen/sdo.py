@@ -95,6 +95,7 @@ def upload(index: int, subindex: int, block_above: int | None = None) -> Transfe
 def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
     data = bytearray()
     toggle = 0
+    empty = 0
     while True:
         answer = yield Exchange((bytes([0x60 | toggle]) + bytes(7),), None)
         _raise_abort(answer, mux, writing=False)
@@ -110,6 +111,9 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
             )
         if command & 0x01:
             break
+        empty = 0 if command >> 1 & 7 < 7 else empty + 1
+        if empty > _BLOCK:
+            yield from _give_up(mux, ABORT_SEQUENCE, text("sdo.same-segments"))
         toggle ^= 0x10
     if announced is not None and len(data) != announced:
         raise ProtocolError(
@@ -252,6 +256,20 @@ def block_download(index: int, subindex: int, data: bytes) -> Transfer[None]:
     _raise_abort(answer, mux, writing=True)
     if answer[0] & 0xE3 != 0xA1:
         yield from _give_up(mux, ABORT_COMMAND, _unexpected(answer[0]))
+
+
+def fitted(data: bytes, size: int | None) -> bytes:
+    """Cut ``data`` to ``size`` if only padding is removed.
+
+    Some drives send four bytes for every object, filled with zeros or with the sign.
+    """
+    if size is None or len(data) <= size:
+        return data
+    rest = data[size:]
+    sign = b"\xff" if data[size - 1] & 0x80 else b"\0"
+    if rest.strip(b"\0") == b"" or rest.strip(sign) == b"":
+        return data[:size]
+    return data
 
 
 def answers(frame: bytes, exchange: Exchange) -> bool:

@@ -6,6 +6,7 @@ incident is an event. Nothing here blocks, as the other process owns the wire.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -111,8 +112,14 @@ class EthercatLink:
         if not RAW_FRAMES:
             _require_capture(self.interface)
         await self._host.start()
-        if self._raw_frames:
+        if not self._raw_frames:
+            return
+        try:
             await self.recorder.start()
+        except BaseException:
+            # Cancelled: whoever opens it again would find the interface in use.
+            await self.close()
+            raise
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Further calls have no effect."""
@@ -321,8 +328,8 @@ class EthercatLink:
             LinkLost: the host or the interface is gone.
         """
         stations = (await self.survey()).stations
-        if all(each.station != station for each in stations):
-            # The search before the refusal did not find it.
+        if all(each.station != station or each.lost for each in stations):
+            # The search before the refusal did not find it, or it was lost since.
             found = Evidence(station=station, answers=False)
             return found, diagnose(found)
         facts: Message = await self._call({"op": "examine", "station": station}, _SCAN_S)
@@ -402,7 +409,12 @@ class EthercatLink:
     def _notify(self, event: LinkEvent) -> None:
         self.recorder.note(f"{event.kind}: {event.text.words()}", event.station)
         for listener in tuple(self._listeners):
-            listener(event)
+            try:
+                listener(event)
+            except Exception as error:
+                # Raised here it would be taken for a fault of the host process, which is replaced.
+                context = {"message": f"a listener failed at {event}", "exception": error}
+                asyncio.get_running_loop().call_exception_handler(context)
 
 
 def _found(item: Message) -> Found:

@@ -65,10 +65,14 @@ class SegmentRecorder:
         Raises:
             LinkLost: the recorder does not run.
         """
-        if self._streams is None:
-            raise self._gone()
-        reader, writer = self._streams
+        # An answer is always read to its end: what is left of it would be taken for the next one.
+        return await asyncio.shield(asyncio.create_task(self._file(station)))
+
+    async def _file(self, station: int | None) -> bytes:
         async with self._asking:
+            if self._streams is None:
+                raise self._gone()
+            reader, writer = self._streams
             try:
                 writer.write(json.dumps({"file": True, "station": station}).encode() + b"\n")
                 async with asyncio.timeout(_FILE_S):

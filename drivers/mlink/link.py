@@ -93,7 +93,7 @@ class MlinkLayout:
         return self._limits.get(station, BlockLimits(_MAX_WORDS, 0))
 
     def identity(self) -> tuple[Address, ...]:
-        """Status word, mode, and the identity object (CiA 301 clause 7.5.2.19)."""
+        """Status word, mode, and the identity object (CiA 301 clause 7.5.2.21)."""
         return (
             Address(0x6041, 0, "UINT16"),
             Address(0x6061, 0, "INT8"),

@@ -43,6 +43,7 @@ from drivers.motion.setpoint_plan import (
 )
 from drivers.texts.message import Text, text
 from drivers.texts.states import state_text
+from profiles.schema import INTEGER_RANGE
 
 STOP_S = 0.1
 """Ramp time from any speed to standstill [s]; below the 200 ms in which lost setpoints must end."""
@@ -51,6 +52,8 @@ LET_GO_S = 0.05
 
 _RESTLESS = 2
 """Encoder noise of an axis at standstill, in increments per cycle."""
+_LOWEST, _HIGHEST = INTEGER_RANGE["INT32"]
+"""Range of a position setpoint [increments] (CiA 402-2, 607Ah)."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
@@ -60,6 +63,8 @@ _STALE_CYCLES = 3
 """Samples that may be older than a state a mailbox reported before the axis was enabled again."""
 _SETTLES = 2
 """An axis that lags behind its ramp may take this many ramp times longer to come to a hold."""
+_RESET_S = 3.0
+"""How long a fault that stays is reset [s]: as long as a person waits for the result."""
 _REST_S, _GIVE_UP = 0.05, 30
 """Dwell without motion that counts as standstill [s]; time-out as a multiple of this dwell."""
 
@@ -103,6 +108,8 @@ class AxisLoop:
         self._place = 0
         self._life = 0
         self._reset = False
+        self._reset_left = 0
+        self._reset_cycles = max(round(_RESET_S / cycle_s), 1)
         self._setpoint = 0.0
         self._speed = 0.0
         self._brake_step = 0.0
@@ -163,8 +170,13 @@ class AxisLoop:
         self.goal = goal
 
     def reset_fault(self) -> None:
-        """Reset a fault once; the axis stays disabled."""
-        self._reset = True
+        """Reset a fault once; the axis stays disabled.
+
+        Does nothing to an axis that is enabled or in a quick stop: without power it would coast.
+        """
+        if self.state in _ALIVE_STATES:
+            return
+        self._reset, self._reset_left = True, self._reset_cycles
         self.goal = State.SWITCH_ON_DISABLED
         self.halted = None
 
@@ -175,6 +187,10 @@ class AxisLoop:
             NotAllowed: not enabled, a required object is not mapped, or the first value is a jump.
         """
         self.check(motion)
+        # An end before the first value brakes from here; the place or speed of an earlier motion
+        # must not become a setpoint of this one.
+        self._setpoint = self.setpoint_now(motion.target) or 0
+        self._clear_offsets()
         self._motion = motion
         self._place = 0
         self._life = motion.renew_cycles
@@ -416,7 +432,9 @@ class AxisLoop:
         if self._brake_target == POSITION:
             self._speed -= self._brake_step
             if self._brake_left > 0:
-                self._setpoint += self._speed
+                # Beyond the limits of its type a setpoint could not be sent, nor could the
+                # control word that follows.
+                self._setpoint = min(max(self._setpoint + self._speed, _LOWEST), _HIGHEST)
             self._set(POSITION, round(self._setpoint))
         else:
             self._setpoint = self._setpoint - self._brake_step if self._brake_left > 0 else 0.0
@@ -448,9 +466,12 @@ class AxisLoop:
                 self.goal = State.SWITCH_ON_DISABLED
         if self.goal is None:
             return
-        if self.state in (State.FAULT, State.FAULT_REACTION) and not self._reset:
-            self.outputs[place] = cia402.DISABLE_VOLTAGE
-            return
+        if self.state in (State.FAULT, State.FAULT_REACTION):
+            self._reset_left -= 1
+            if not self._reset or self._reset_left < 0:
+                self._reset = False
+                self.outputs[place] = cia402.DISABLE_VOLTAGE
+                return
         if self._brakes_itself:
             # A limit switch or the drive itself began a quick stop, which needs power for braking.
             if self.state is State.QUICK_STOP_ACTIVE and self._may_brake():
@@ -526,7 +547,7 @@ class AxisLoop:
                 wanted=int(wanted),
                 mode_names=cia402.MODE_NAMES[wanted],
             )
-        motion.limits.require_watched(self._in, where)
+        motion.limits.require_watched(self._in, where, motion.target)
         if self.phase is Phase.BRAKING:
             raise NotAllowed("cyclic.braking", where=where, why=self._why)
         if not len(motion.values):

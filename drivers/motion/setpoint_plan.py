@@ -43,21 +43,25 @@ class Limits:
     torque_off_only: bool = False
     """Beyond a limit a torque only becomes zero, without a quick stop."""
 
-    def require_watched(self, inputs: Container[int], where: str) -> None:
+    def require_watched(self, inputs: Container[int], where: str, target: int = POSITION) -> None:
         """Check that the actual value of each limit is among these objects of the cyclic data.
 
-        The following error is not checked: where 60F4h is missing, the loop computes it from the
-        position.
+        Where 60F4h is missing, the loop computes the following error of a position ``target`` from
+        the position.
 
         Raises:
             NotAllowed: one is missing.
         """
         compared = self.feedback
+        lag = FOLLOWING
+        if target == POSITION and FOLLOWING not in inputs:
+            lag = ACTUAL_POSITION
         for name, index, limit in (
             ("travel", ACTUAL_POSITION, self.position_min),
             ("travel", ACTUAL_POSITION, self.position_max),
             ("speed", ACTUAL_VELOCITY, self.speed_max),
             ("torque", ACTUAL_TORQUE, self.torque_max),
+            ("following error", lag, self.following_error_max),
             ("speed", ACTUAL_POSITION, compared and compared.velocity_per_inc_s),
             ("speed", ACTUAL_VELOCITY, compared and compared.velocity_per_inc_s),
         ):

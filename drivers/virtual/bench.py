@@ -35,6 +35,7 @@ from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import Text, joined
 from drivers.texts.profile_errors import profile_error_text
+from drivers.texts.validation import reason_of
 from drivers.urls import parse_url
 from drivers.virtual.defects import (
     DEFECTS,
@@ -126,7 +127,7 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
             value=str(path),
             path=str(path),
             place=place,
-            first=first["msg"],
+            first=reason_of(first),
         ) from error
     except OSError as error:
         raise _wrong(path, f"{error.filename or path}: {error.strerror}") from error

@@ -81,7 +81,7 @@ def _values(sections: dict[str, Section], name: str) -> Iterator[ConfiguredValue
         if (match := COMPACT.match(title)) and match[2] == "value":
             kind = _type_of(sections.get(match[1], section), name)
             for key, text in section.values.items():
-                if key.isdecimal() and 1 <= int(key) <= 254 and text:
+                if key.isdecimal() and len(key) <= 3 and 1 <= int(key) <= 254 and text:
                     yield ConfiguredValue(int(match[1], 16), int(key), text, section.line, kind)
             continue
         value = section.get("parametervalue")
@@ -98,5 +98,7 @@ def _type_of(section: Section, name: str) -> DataType | None:
 
 
 def _of_node(value: ConfiguredValue, node_id: int | None, name: str, report: ImportReport) -> str:
+    if value.type == "STRING":
+        return value.text  # which may contain anything
     added = node_relative(value.text, f"{name}:{value.line}", report)
     return value.text if added is None or node_id is None else f"{added + node_id:#x}"

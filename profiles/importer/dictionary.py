@@ -5,13 +5,19 @@ Source: ETG.1000.6 clause 5.6.3 (object access flags), clause 5.6.7.3 (data type
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from profiles.importer.description import MAX_ENTRIES, DescribedEntry, Description
 from profiles.importer.report import ImportFailed, ImportReport
-from profiles.importer.values import TYPE_BY_CODE, named_type, tidy, unit_of_code, unit_of_name
+from profiles.importer.values import (
+    TYPE_BY_CODE,
+    named_type,
+    real_of_bits,
+    tidy,
+    unit_of_code,
+    unit_of_name,
+)
 from profiles.schema import INTEGER_RANGE, Access, DataType, LinkKind, PdoMapping
 
 
@@ -122,9 +128,9 @@ def _described(entry: DictionaryEntry, file: str, report: ImportReport) -> Descr
 
 
 def _number(data: bytes, data_type: DataType) -> int | float | None:
-    """Return a value of this type, or None for text and for another length."""
+    """Return a value of this type, or None for text, for another length, infinity and NaN."""
     if data_type == "REAL32":
-        return float(struct.unpack("<f", data)[0]) if len(data) == 4 else None
+        return real_of_bits(int.from_bytes(data, "little")) if len(data) == 4 else None
     limits = INTEGER_RANGE.get(data_type)
     if limits is None or not data:
         return None

@@ -35,6 +35,7 @@ from profiles.importer.values import (
     real_of_bits,
     tidy,
     unit_of_name,
+    without_remark,
 )
 from profiles.schema import DataType, PdoMapping, Raw
 
@@ -112,7 +113,7 @@ _BIT_RATES = {f"baudrate_{kbit}": kbit * 1000 for kbit in (10, 20, 50, 125, 250,
 
 def _bit_rates(device: Section) -> tuple[int, ...]:
     return tuple(
-        rate for key, rate in _BIT_RATES.items() if device.get(key) in ("1", "0x1", "0x01")
+        rate for key, rate in _BIT_RATES.items() if device.word(key) in ("1", "0x1", "0x01")
     )
 
 
@@ -260,7 +261,7 @@ class _Entries:
         text = section.get(key.lower())
         if re.search(r"node[-_ ]?id", text, re.I):
             return None
-        number = parse_number(text, f"{place} {key}", self._report)
+        number = parse_number(without_remark(text), f"{place} {key}", self._report)
         if data_type == "REAL32" and number is not None and text.strip()[:2].lower() == "0x":
             number = real_of_bits(int(number))
         return fit(number, data_type, key, place, self._report)

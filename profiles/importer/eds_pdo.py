@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import Literal
 
 from profiles.importer.description import DescribedEntry, DescribedPdo
-from profiles.importer.eds_sections import Section
+from profiles.importer.eds_sections import SUBOBJECT, Section
 from profiles.importer.report import ImportReport
 from profiles.importer.values import node_relative, parse_number
-from profiles.schema import PdoIdentifier
+from profiles.schema import DataType, PdoIdentifier
 
 _IDENTIFIER = 0x7FF
+#: Bits of a whole object by its type; a boolean takes one byte as a value of its own.
+_BITS: dict[DataType, int] = {
+    "BOOL": 8, "INT8": 8, "UINT8": 8, "INT16": 16, "UINT16": 16, "INT32": 32, "UINT32": 32,
+    "INT64": 64, "UINT64": 64, "REAL32": 32,
+}  # fmt: skip
 
 
 def read_pdos(
@@ -19,13 +24,14 @@ def read_pdos(
     """Read default mappings from the defaults of 1600h… and 1A00h…."""
     by_key = {e.key: e for e in entries}
     keys = set(by_key)
+    defaults = _defaults(sections)
     pdos: list[DescribedPdo] = []
     by_index: dict[int, list[DescribedEntry]] = {}
     for entry in entries:
         if 0x1600 <= entry.index < 0x1800 or 0x1A00 <= entry.index < 0x1C00:
             by_index.setdefault(entry.index, []).append(entry)
     for index, mapping in sorted(by_index.items()):
-        layout = _layout(index, mapping, sections, keys, name, report)
+        layout = _layout(index, mapping, defaults, keys, name, report)
         mapped = tuple(dict.fromkeys(key for key, _ in layout if key is not None))
         fixed = all(e.access == "ro" for e in mapping)
         if mapped or not fixed:
@@ -37,24 +43,32 @@ def read_pdos(
                     mapped,
                     fixed,
                     name,
-                    layout=() if len(mapped) == len(layout) else tuple(layout),
-                    identifier=_identifier(index, by_key, sections, name, report),
+                    layout=() if _whole_objects(layout, by_key) else tuple(layout),
+                    identifier=_identifier(index, by_key, defaults, name, report),
                 )
             )
     return pdos
 
 
+def _whole_objects(layout: list[tuple[str | None, int]], by_key: dict[str, DescribedEntry]) -> bool:
+    """Return whether the keys describe it fully: no padding, no parts of objects, no duplicates."""
+    keys = [key for key, _ in layout]
+    return len(set(keys)) == len(keys) and all(
+        key is not None and bits == _BITS.get(by_key[key].type or "OCTETS") for key, bits in layout
+    )
+
+
 def _layout(
     index: int,
     mapping: list[DescribedEntry],
-    sections: dict[str, Section],
+    defaults: dict[tuple[int, int], str],
     keys: set[str],
     name: str,
     report: ImportReport,
 ) -> list[tuple[str | None, int]]:
     """Return keys and bits of the default mapping. Entries beyond subindex 0's count are unused."""
     place = f"{name} [{index:04X}]"
-    count = parse_number(_default(sections, index, 0), place, report)
+    count = parse_number(defaults.get((index, 0), ""), place, report)
     layout: list[tuple[str | None, int]] = []
     for entry in sorted(mapping, key=lambda e: e.subindex):
         value = entry.default_raw
@@ -80,13 +94,13 @@ def _layout(
 def _identifier(
     index: int,
     by_key: dict[str, DescribedEntry],
-    sections: dict[str, Section],
+    defaults: dict[tuple[int, int], str],
     name: str,
     report: ImportReport,
 ) -> PdoIdentifier | None:
     """Return the default COB-ID; None if the file states no valid one."""
     communication = index - 0x200
-    text = _default(sections, communication, 1)
+    text = defaults.get((communication, 1), "")
     place = f"{name} [{communication:04X}sub1]"
     added = node_relative(text, place, report)
     number = added if added is not None else parse_number(text, place, report)
@@ -100,6 +114,10 @@ def _identifier(
     )
 
 
-def _default(sections: dict[str, Section], index: int, subindex: int) -> str:
-    section = sections.get(f"{index:04x}sub{subindex:x}")
-    return "" if section is None else section.word("defaultvalue")
+def _defaults(sections: dict[str, Section]) -> dict[tuple[int, int], str]:
+    """Return default values by index and subindex, whatever the spelling of their headings."""
+    return {
+        (int(match[1], 16), int(match[2], 16)): section.word("defaultvalue")
+        for title, section in sections.items()
+        if (match := SUBOBJECT.match(title))
+    }

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 
 from profiles.importer.report import ImportReport
-from profiles.importer.values import parse_number
+from profiles.importer.values import parse_number, without_remark
 
 _MAX_LINES = 400_000
 #: Other characters that Python treats as line ends occur within texts.
@@ -17,10 +17,6 @@ SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2
 COMPACT = re.compile(r"(?:0x)?([0-9a-f]{4})(name|value|denotation)$")
 #: The section that distinguishes a DCF from an EDS; the standard spells it with one m.
 COMMISSIONING = ("devicecomissioning", "devicecommissioning")
-#: Start of an editor's remark after a value: text may contain both, numbers and words of the
-#: standard cannot. White space before it is not in the pattern: searching for it takes quadratic
-#: time in its length, and a file may contain a megabyte of it.
-_REMARK = re.compile(r";|//")
 
 
 @dataclass(slots=True)
@@ -36,9 +32,7 @@ class Section:
 
     def word(self, *names: str) -> str:
         """Return the same without a trailing remark, for numbers and words of the standard."""
-        value = self.get(*names)
-        remark = _REMARK.search(value)
-        return value if remark is None else value[: remark.start()].rstrip()
+        return without_remark(self.get(*names))
 
 
 def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Section]:

@@ -36,6 +36,33 @@ _TRANSITION = re.compile(r"[IPSOB]{2}")
 _MOST_COMMANDS, _MOST_MODES, _MOST_MANAGERS, _MOST_BYTES = 1000, 64, 16, 4096
 
 
+def manager_kind(item: Element, number: int) -> SyncManagerKind | None:
+    """Return the kind of a sync manager by its name, else by its number; None if unknown."""
+    name = text_of(item).lower().replace(" ", "")
+    return _KINDS.get(name) or (_BY_NUMBER[number] if number < len(_BY_NUMBER) else None)
+
+
+def assign_activate(mode: Element, place: str, report: ImportReport) -> int:
+    """Return the clock's register word of an operation mode; 0 if it cannot be interpreted."""
+    word = text_of(child(mode, "AssignActivate")) or "0"
+    if re.fullmatch(r"0\d{3}", word):
+        # Register bits: a leading zero means hexadecimal, as decimal numbers are written without.
+        report.repaired(place, "description.hexadecimal", value=word)
+        word = f"#x{word}"
+    activate = whole_number(word, place, report)
+    if activate is None or not 0 <= activate <= 0xFFFF:
+        report.left_out(place, "description.assign-activate")
+        return 0
+    return activate
+
+
+def signed_number(text: str, place: str, report: ImportReport) -> int | None:
+    """Read a number that may be negative, as factors and shifts are (ETG.2000 table 38)."""
+    bare = text.strip()
+    number = whole_number(bare.removeprefix("-"), place, report)
+    return -number if number is not None and bare.startswith("-") else number
+
+
 def read_bring_up(element: Element, file: str, report: ImportReport) -> BringUp:
     """Read the prescriptions of one ``Device`` element; missing parts stay empty."""
     return _Reader(element, file, report).read()
@@ -133,14 +160,13 @@ class _Reader:
     def _managers(self) -> tuple[SyncManagerRule, ...]:
         found = []
         for number, item in enumerate(children(self._device, "Sm")[:_MOST_MANAGERS]):
-            name = text_of(item).lower().replace(" ", "")
-            kind = _KINDS.get(name) or (_BY_NUMBER[number] if number < len(_BY_NUMBER) else None)
+            kind = manager_kind(item, number)
             if kind is None:
                 self._report.left_out(
                     self._file,
                     "description.sync-manager-unknown",
                     number=number,
-                    name=name[:20],
+                    name=text_of(item).lower().replace(" ", "")[:20],
                 )
                 continue
             place = f"{self._file}: Sm {number}"
@@ -161,16 +187,7 @@ class _Reader:
     def _mode(self, mode: Element) -> ClockMode:
         name = tidy(text_of(child(mode, "Name"))) or "unnamed"
         place = f"{self._file}: OpMode {name[:20]}"
-        word = text_of(child(mode, "AssignActivate")) or "0"
-        if re.fullmatch(r"0\d{3}", word):
-            # Register bits: a leading zero means hexadecimal, as decimal numbers are written
-            # without.
-            self._report.repaired(place, "description.hexadecimal", value=word)
-            word = f"#x{word}"
-        activate = whole_number(word, place, self._report)
-        if activate is None or not 0 <= activate <= 0xFFFF:
-            self._report.left_out(place, "description.assign-activate")
-            activate = 0
+        activate = assign_activate(mode, place, self._report)
         pdos = []
         for manager in children(mode, "Sm"):
             number = whole_number(attribute_of(manager, "No"), place, self._report)
@@ -196,15 +213,9 @@ class _Reader:
         if cycle is None and shift is None:
             return None
         length = whole_number(text_of(cycle) or "0", place, self._report) or 0
-        factor = self._signed(attribute_of(cycle, "Factor") or "1", place)
-        shift_ns = self._signed(text_of(shift) or "0", place) or 0
+        factor = signed_number(attribute_of(cycle, "Factor") or "1", place, self._report)
+        shift_ns = signed_number(text_of(shift) or "0", place, self._report) or 0
         return SyncSignal(cycle_ns=max(length, 0), factor=factor or 1, shift_ns=shift_ns)
-
-    def _signed(self, text: str, place: str) -> int | None:
-        """Read a number that may be negative, as factors and shifts are (ETG.2000 table 38)."""
-        bare = text.strip()
-        number = whole_number(bare.removeprefix("-"), place, self._report)
-        return -number if number is not None and bare.startswith("-") else number
 
     def _timeouts(self) -> StateTimeouts:
         info = child(self._device, "Info")

@@ -11,17 +11,12 @@ from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element
 
 from profiles.importer.esi import EsiFile, esi_devices, open_esi
+from profiles.importer.esi_bring_up import assign_activate, manager_kind, signed_number
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.values import whole_number
 from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
 
 SyncKind = Literal["mailbox_out", "mailbox_in", "outputs", "inputs"]
-_KINDS: dict[str, SyncKind] = {
-    "mboxout": "mailbox_out",
-    "mboxin": "mailbox_in",
-    "outputs": "outputs",
-    "inputs": "inputs",
-}
 _MEMORY, _MEMORY_END = 0x1000, 0x10000
 #: Size of the smallest CoE mailbox (ETG.1000.6), and the largest length of a sync manager.
 _SHORTEST_MAILBOX, _LONGEST = 16, 0x7FFF
@@ -135,11 +130,11 @@ def _of_file(file: EsiFile, vendor: int, product: int, revision: int | None) -> 
 def _controller(element: Element, name: str, report: ImportReport) -> SlaveController:
     managers = []
     for number, each in enumerate(children(element, "Sm")):
-        kind = _KINDS.get(text_of(each).lower())
+        kind = manager_kind(each, number)
         start = _number(each, "StartAddress", name, report)
         control = _number(each, "ControlByte", name, report)
         length = _number(each, "DefaultSize", name, report)
-        if kind is None:
+        if kind is None or (not text_of(each) and not start):
             continue
         mailbox = kind.startswith("mailbox")
         if not _MEMORY <= start < _MEMORY_END or (
@@ -157,10 +152,10 @@ def _controller(element: Element, name: str, report: ImportReport) -> SlaveContr
     modes = children(child(element, "Dc"), "OpMode")
     activate = shift = 0
     if modes:
-        words = [_text_number(child(mode, "AssignActivate"), name, report) for mode in modes]
+        words = [assign_activate(mode, name, report) for mode in modes]
         at = next((n for n, word in enumerate(words) if word), 0)
         activate = words[at]
-        shift = _text_number(child(modes[at], "ShiftTimeSync0"), name, report)
+        shift = signed_number(text_of(child(modes[at], "ShiftTimeSync0")) or "0", name, report) or 0
     elif child(element, "Dc") is not None:
         activate = _SYNC0
     return SlaveController(
@@ -168,7 +163,7 @@ def _controller(element: Element, name: str, report: ImportReport) -> SlaveContr
         sync_managers=tuple(managers),
         assigns=flag_of(coe, "PdoAssign"),
         configures=flag_of(coe, "PdoConfig"),
-        assign_activate=activate & 0xFFFF,
+        assign_activate=activate,
         shift_ns=shift,
         source=name,
     )
@@ -176,9 +171,4 @@ def _controller(element: Element, name: str, report: ImportReport) -> SlaveContr
 
 def _number(element: Element, attribute: str, name: str, report: ImportReport) -> int:
     text = attribute_of(element, attribute)
-    return (whole_number(text, name, report) or 0) if text else 0
-
-
-def _text_number(element: Element | None, name: str, report: ImportReport) -> int:
-    text = text_of(element)
     return (whole_number(text, name, report) or 0) if text else 0

@@ -80,10 +80,15 @@ def module_list(root: Element, device: Element) -> InitCommand | None:
     slots = child(device, "Slots")
     if slots is None or not flag_of(slots, "DownloadModuleIdentList"):
         return None
-    idents = [
-        _number(attribute_of(child(part.element, "Type"), "ModuleIdent")) or 0
-        for part in parts_of(root, device)[1:]
-    ]
+    # Subindex n is slot n, and an empty slot has 0 (ETG.5001).
+    idents = [_delivered(slot, number) or 0 for number, slot in enumerate(_slots(slots))]
+    if not any(idents):
+        idents = [
+            _number(attribute_of(child(part.element, "Type"), "ModuleIdent")) or 0
+            for part in parts_of(root, device)[1:]
+        ]
+    while idents and not idents[-1]:
+        idents.pop()
     if not idents:
         return None
     data = struct.pack(f"<H{len(idents)}I", len(idents), *idents)

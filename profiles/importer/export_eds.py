@@ -185,10 +185,19 @@ def _object(
     lines = [
         f"[{index:04X}]", f"ParameterName={_text(title)}", f"ObjectType=0x{_RECORD:X}",
         f"SubNumber={len(counted) + 1}", "",
-        f"[{index:04X}sub0]", "ParameterName=Highest subindex", f"ObjectType=0x{_VARIABLE:X}",
-        "DataType=0x0005", "AccessType=ro", f"DefaultValue={count}",
-        "PDOMapping=0", "",
+        f"[{index:04X}sub0]",
     ]  # fmt: skip
+    own = next((p for p in members if not p.subindex), None)
+    if own is not None:
+        # The number of mapped objects (1600h, 1C12h) can be written.
+        if not own.default_raw:
+            own = own.model_copy(update={"default_raw": count})
+        lines += [*_entry(own, own.name, values, pdos), ""]
+    else:
+        lines += [
+            "ParameterName=Highest subindex", f"ObjectType=0x{_VARIABLE:X}", "DataType=0x0005",
+            "AccessType=ro", f"DefaultValue={count}", "PDOMapping=0", "",
+        ]  # fmt: skip
     for parameter in counted:
         name = parameter.name.partition(":")[2].strip() or parameter.name
         lines.append(f"[{index:04X}sub{parameter.subindex or 0:X}]")

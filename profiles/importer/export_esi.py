@@ -6,6 +6,7 @@ are left out or written in the smallest form that the format allows.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -23,6 +24,8 @@ _BITS: dict[DataType, int] = {
 }  # fmt: skip
 _TEXT_BYTES = 32
 """Length of a text of unknown size."""
+#: Characters that no XML file may contain; texts of EDS files may.
+_FORBIDDEN = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _MANAGER_NAMES = {
     "mailbox_out": "MBoxOut",
     "mailbox_in": "MBoxIn",
@@ -72,7 +75,7 @@ def export_esi(profile: Profile) -> bytes:
 
 def _text(parent: Element, tag: str, text: str) -> Element:
     element = SubElement(parent, tag)
-    element.text = text
+    element.text = _FORBIDDEN.sub("", text)
     return element
 
 
@@ -175,7 +178,9 @@ def _object(types: Element, objects: Element, index: int, members: list[Paramete
         _info(SubElement(item, "Info"), parameter)
         start = max(start, at + bits)
     size.text = own_size.text = str(start)
-    _flags(element, members[-1])
+    # Members without a mapping of their own would have that of the object.
+    alike = len({p.pdo for p in members}) == 1
+    _flags(element, members[-1] if alike else members[-1].model_copy(update={"pdo": "none"}))
 
 
 def _named(name: str) -> Element:
@@ -209,14 +214,20 @@ def _info(info: Element, parameter: Parameter) -> None:
     default = parameter.default_raw
     if isinstance(default, str):
         _text(info, "DefaultString", default)
+    # The bytes of a negative maximum are also those of "no limit", as many files have them.
+    as_numbers = parameter.is_integer and (parameter.max_raw or 0) < 0
     for tag, value in (
-        ("MinData", parameter.min_raw),
-        ("MaxData", parameter.max_raw),
-        ("DefaultData", None if isinstance(default, str) else default),
+        ("Min", parameter.min_raw),
+        ("Max", parameter.max_raw),
+        ("Default", None if isinstance(default, str) else default),
     ):
         data = _data(value, parameter.type)
-        if data is not None:
-            _text(info, tag, data)
+        if data is None:
+            continue
+        if as_numbers:
+            _text(info, f"{tag}Value", str(value))
+        else:
+            _text(info, f"{tag}Data", data)
 
 
 def _data(value: Raw | None, kind: DataType) -> str | None:

@@ -85,6 +85,10 @@ _UNIT_CODES = {
 _UNIT_IN_NAME = re.compile(r"[\[({（]\s*(?:unit\s*:?\s*)?([^\])}）]{1,12}?)\s*[\])}）]\s*$", re.I)
 _NODE_ID = re.compile(r"NODE[-_ ]?ID", re.I)
 _LONGEST_NUMBER = 40
+#: Start of an editor's remark after a value: text may contain both, numbers and words of the
+#: standard cannot. White space before it is not in the pattern: searching for it takes quadratic
+#: time in its length, and a file may contain a megabyte of it.
+_REMARK = re.compile(r";|//")
 #: Fields of ESI and EDS files with an upper limit.
 _MAXIMA = ("MaxValue", "MaxData", "HighLimit")
 _REAL32_MAX = 3.4028234e38
@@ -147,6 +151,12 @@ def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | fl
         report.left_out(place, "description.not-finite", value=text.strip())
         return None
     return value
+
+
+def without_remark(text: str) -> str:
+    """Return a number or word of the standard without an editor's remark after it."""
+    remark = _REMARK.search(text)
+    return text if remark is None else text[: remark.start()].rstrip()
 
 
 def node_relative(text: str, place: str, report: ImportReport) -> int | None:
@@ -219,12 +229,13 @@ def default_value(
 
     ``name`` is the name of the field in the file's format.
     """
-    if _NODE_ID.search(text):
-        return None, f"default {text.strip()[:60]}"
     if data_type == "STRING":
         return text.strip() or None, ""
+    if _NODE_ID.search(text):
+        return None, f"default {text.strip()[:60]}"
     if data_type == "OCTETS":
         return None, ""
+    text = without_remark(text)
     bits = _REAL_BITS.fullmatch(text.strip())
     if data_type == "REAL32" and bits is not None:
         # Real numbers are not written in hexadecimal: these are its bits.

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import yaml
 from pydantic import Field, ValidationError
 
-from profiles.loader import ProfileError, user_folder
+from profiles.loader import YAML_ERRORS, ProfileError, user_folder
 from profiles.record import Frozen
 
 _PROFILES = Path(__file__).parents[1]
@@ -163,7 +163,7 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
     for name, text in texts.items():
         try:
             data = yaml.load(text, Loader=_SafeLoader)  # noqa: S506 - both loaders are safe
-        except yaml.YAMLError as error:
+        except YAML_ERRORS as error:
             raise ProfileError(
                 "profile.no-yaml", file=f"{label}/{name}", detail=str(error)
             ) from error
@@ -182,7 +182,7 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
                     "profile.text-twice",
                     file=f"{label}/{name}",
                     field=str(field),
-                    keys=", ".join(map(str, sorted(twice))),
+                    keys=", ".join(map(str, sorted(twice, key=str))),
                 )
             merged[field] = before | value
     try:

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, field_validator
 
 from backend.api.models import Message, Problem, Raw
 from backend.tools.wire_message import MessageInfo
+from drivers.texts.message import Unsuitable, text
 
 
 class ParameterInfo(Message):
@@ -90,9 +91,7 @@ class ParameterWrite(Message):
     def _no_truth(cls, given: object) -> object:
         if isinstance(given, bool):
             # It would otherwise become 1 or 0 in the parameter's unit.
-            raise ValueError(  # noqa: TRY004 - pydantic reports these only
-                "true and false are no values of a parameter: give the number"
-            )
+            raise Unsuitable(text("input.truth"))
         return given
 
 

@@ -53,6 +53,7 @@ from backend.station.bench import Bench
 from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
+from drivers.texts.validation import reason_of
 
 #: Limit of messages that wait for a slow page; states, values and drive lists
 #: coalesce and are not counted.
@@ -202,7 +203,7 @@ class Connection:
             request = from_page.validate_json(text)
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            problem = DriveError("api-live.not-message-interface", first=first["msg"])
+            problem = DriveError("api-live.not-message-interface", first=reason_of(first))
             self.send(Refused(request="?", problem=problem_of(problem)))
             return
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from dataclasses import replace
 from datetime import UTC, datetime
 
@@ -81,7 +82,8 @@ def _chosen(
     for name in bench.measurements.names() if asked is None else asked:
         try:
             head = measurement_head(bench, name)
-        except BadMeasurement:
+        except (BadMeasurement, NotFound):
+            # Also a file that another person has just deleted.
             if asked is not None:
                 raise
             continue
@@ -105,7 +107,11 @@ def _info(bench: Bench, file: str) -> ReportInfo:
 @router.get("/reports")
 async def list_reports(bench: TheBench) -> list[ReportInfo]:
     """List stored reports, newest first."""
-    return [_info(bench, name) for name in _store(bench).names()]
+    found = []
+    for name in _store(bench).names():
+        with contextlib.suppress(FileNotFoundError):  # deleted at this moment
+            found.append(_info(bench, name))
+    return found
 
 
 @router.get("/reports/{name}", response_class=Response)

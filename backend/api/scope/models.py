@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from backend.api.models import Finite, Message, Positive
+from drivers.texts.message import Unsuitable, text
 
 TraceId = Annotated[str, Field(pattern=r"^[cm][0-9]{1,3}$")]
 
@@ -67,7 +68,7 @@ class ScopeRange(Message):
     @model_validator(mode="after")
     def _of_some_height(self) -> Self:
         if not self.low < self.high:
-            raise ValueError(f"the scale of {self.unit or 'no unit'} must go upwards")
+            raise Unsuitable(text("input.scale-not-upwards", low=self.low, high=self.high))
         return self
 
 

@@ -121,14 +121,15 @@ def _stored(stored: Stored) -> RecordingInfo:
 
 
 def _axis(axis: dict[str, Any]) -> RecordedAxis:
+    serial = axis.get("serial")
     return RecordedAxis(
-        drive=str(axis["drive"]),
-        name=str(axis["name"]),
-        profile=str(axis["profile"]),
-        title=str(axis["title"]),
-        serial=axis["serial"],
-        firmware=str(axis["firmware"]),
-        parameters=len(axis["parameters"]),
+        drive=str(axis.get("drive", "")),
+        name=str(axis.get("name", "")),
+        profile=str(axis.get("profile", "")),
+        title=str(axis.get("title", "")),
+        serial=serial if isinstance(serial, int) else None,
+        firmware=str(axis.get("firmware", "")),
+        parameters=len(axis.get("parameters", [])),
     )
 
 
@@ -261,7 +262,9 @@ def _detail(path: Path, info: RecordingInfo) -> RecordingDetail:
             for event in reader.events()
         ]
         parameters = {
-            str(axis["drive"]): [RecordedParameter(**row) for row in axis["parameters"]]
+            str(axis.get("drive", "")): [
+                RecordedParameter(**row) for row in axis.get("parameters", [])
+            ]
             for axis in reader.header.get("axes", [])
         }
     return RecordingDetail(info=info, events=events, parameters=parameters)

@@ -20,6 +20,7 @@ from backend.scope.stored import (
     snapshot_header,
 )
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts.validation import reason_of
 
 router = APIRouter()
 
@@ -96,8 +97,8 @@ async def save_scope_snapshot(store: TheStore, name: str, request: Request) -> S
         raise BadSnapshot(
             "api-scope.no-snapshot-scope",
             value=name,
-            first=str(first["loc"]),
-            other_first=first["msg"],
+            first=".".join(str(part) for part in first["loc"]),
+            other_first=reason_of(first),
         ) from error
     file = await asyncio.to_thread(store.save_snapshot, name, content)
     return SnapshotInfo(name=file, bytes=len(content), header=SnapshotHeader.model_validate(header))

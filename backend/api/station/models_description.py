@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 from backend.api.models import Message
 from backend.api.station.models import FoundDrive
 from backend.tools.wire_message import MessageInfo
+from drivers.texts.message import Unsuitable, text
 
 #: Pattern of a profile's name.
 PROFILE_NAME = r"^[a-z][a-z0-9_]{0,59}$"
@@ -52,7 +53,7 @@ class MotionClassRequest(Message):
     @model_validator(mode="after")
     def _safe_only_at_enable(self) -> MotionClassRequest:
         if self.safe_in_motion and self.motion != "at_enable":
-            raise ValueError("safe_in_motion is for at_enable only")
+            raise Unsuitable(text("input.safe-only-at-enable"))
         return self
 
 

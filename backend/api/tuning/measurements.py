@@ -87,7 +87,8 @@ def _listed(bench: Bench) -> list[MeasurementInfo]:
     for name in bench.measurements.names():
         try:
             rows.append(info_of(name, bench.measurements.head(name)))
-        except BadMeasurement as error:
+        except NotAllowed as error:
+            # Damaged, or copied by hand under a name by which it cannot be opened.
             rows.append(
                 MeasurementInfo(
                     file=name, kind="", drive="", profile="", serial=None, saved=None,

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.texts.message import Unsuitable, text
+
 
 class CycleSettings(BaseModel):
     """How long to read, or which recording to use; and catalogue data of motor and drive."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     duration_s: float = Field(
         default=60.0, ge=2, le=3600, description="how long the drive is read, in s"
@@ -65,7 +67,9 @@ class CycleSettings(BaseModel):
     @model_validator(mode="after")
     def _whole(self) -> CycleSettings:
         if (self.overload_percent is None) != (self.overload_s is None):
-            raise ValueError("give both overload_percent and overload_s, or none of them")
+            raise Unsuitable(text("cycle.overload-half"))
         if self.rise_k is not None and self.ambient_c >= 40.0 + self.rise_k:
-            raise ValueError("ambient_c is as warm as the winding may become")
+            raise Unsuitable(
+                text("cycle.ambient-too-warm", ambient_c=self.ambient_c, limit_c=40.0 + self.rise_k)
+            )
         return self

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field, model_validator
 
 from backend.tools.tool import ToolSettings
+from drivers.texts.message import Unsuitable, text
 
 
 class HealthSettings(ToolSettings):
@@ -25,5 +26,5 @@ class HealthSettings(ToolSettings):
     @model_validator(mode="after")
     def _something(self) -> HealthSettings:
         if not (self.response or self.friction or self.inertia or self.step_rpm):
-            raise ValueError("choose at least one measurement")
+            raise Unsuitable(text("health.nothing-chosen"))
         return self

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy.typing as npt
 
 from backend.axis.axis import Axis, Envelope
 from backend.axis.cyclic import CyclicSession
+from backend.drive.readings import Reading
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.interrupted import Interrupted, require_enabled
@@ -30,7 +32,7 @@ from backend.tools.measuring.recording import (
 )
 from backend.tools.thresholds import inertia_probe as threshold
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed
+from drivers.errors import LinkTimeout, NotAllowed
 
 _TURN = 2 * np.pi
 
@@ -55,6 +57,7 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
     Raises:
         NotAllowed: the axis oscillates under its speed loop.
         Interrupted: the speed loop does not hold it.
+        LinkTimeout: half or more of the readings of torque or speed failed.
     """
     units, drive = await axis.units(), axis.drive
     key, speed = drive.require("torque_actual"), drive.require("velocity_actual")
@@ -67,7 +70,7 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
         # A disabled drive reports no torque: a load on its brake would seem to need none, and would
         # fall.
         await require_enabled(axis)
-    raws = [(_integer(r[key].raw), _integer(r[speed].raw)) for r in readings]
+    raws = _known(drive.name, [(r[key], r[speed]) for r in readings])
     torque = np.array([units.torque(t) for t, _ in raws])
     turning = np.array([units.velocity(v) for _, v in raws])
     if (
@@ -98,8 +101,25 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
     return float(np.mean(torque)) / 100.0 * facts.rated_torque_nm
 
 
-def _integer(raw: object) -> int:
-    return raw if isinstance(raw, int) else 0
+def _known(name: str, pairs: Sequence[tuple[Reading, Reading]]) -> list[tuple[int, int]]:
+    """Raw torque and speed of the readings that have both; a few may be lost on the way.
+
+    An unread torque is no torque of zero: a load that is taken to pull nothing would fall.
+
+    Raises:
+        LinkTimeout: half or more of them could not be read.
+    """
+    found = [
+        (torque.integer, speed.integer)
+        for torque, speed in pairs
+        if torque.integer is not None and speed.integer is not None
+    ]
+    if 2 * len(found) <= len(pairs):
+        lost = next(each for pair in pairs for each in pair if each.integer is None)
+        raise LinkTimeout(
+            "moves.not-read-during-motion", drive=name, parameter=lost.key, error=lost.problem
+        )
+    return found
 
 
 async def probe_axis(

@@ -28,7 +28,7 @@ async def go_back(
     more slowly. At most `threshold.ATTEMPTS` moves are made in succession.
 
     Raises:
-        NotAllowed: the motion was ended by the envelope or a fault.
+        NotAllowed: the motion was ended by the envelope or a fault, or the axis did not arrive.
     """
     units = await axis.units()
     rest = units.position(goal_raw - await axis.position_raw())
@@ -61,6 +61,16 @@ async def go_back(
             continue
         before, rest = rest, units.position(goal_raw - await axis.position_raw())
         moves.append((distance, before - rest))
+    # Whatever comes next would count its travel from elsewhere.
+    far = max(threshold.FAR_REV, threshold.FAR * envelope.travel_rev)
+    if abs(rest) > far:
+        raise NotAllowed(
+            "moves.not-back",
+            drive=axis.drive.name,
+            value=round(rest, 4),
+            limit=f"{far:.3g} rev",
+            away_rev=abs(rest),
+        )
 
 
 async def _move(

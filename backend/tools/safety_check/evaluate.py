@@ -365,9 +365,15 @@ class _Check:
             return "power_off_at_speed"
         if exceeded:
             return "beyond_limits"
-        if obstacle is not None:
-            return "not_shown"
         limits = (settings.torque_free_limit_ms, settings.stop_limit_ms, settings.stop_limit_rev)
+        # A limit is met by a measured value only: a limit switch may leave the torque on, and an
+        # axis at limited speed may never stop.
+        known = (free if distinct else None, rest, rest)
+        unknown = any(
+            limit is not None and at is None for limit, at in zip(limits, known, strict=True)
+        )
+        if obstacle is not None or unknown:
+            return "not_shown"
         judged = any(each is not None for each in limits) or settings.function == "speed_limit"
         return "within_limits" if judged else "recorded"
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from backend.tools.tool import Option, ToolSettings
+from drivers.texts.message import Unsuitable, text
 
 Choice = Literal["auto", "zv", "zvd", "ei"]
 
@@ -61,7 +62,9 @@ class ShapingSettings(ToolSettings):
     @model_validator(mode="after")
     def _in_order(self) -> ShapingSettings:
         if self.size == 0.0:
-            raise ValueError("size must not be 0")
+            raise Unsuitable(text("shaping.no-size"))
         if self.lowest_hz >= self.highest_hz:
-            raise ValueError("lowest_hz must be below highest_hz")
+            raise Unsuitable(
+                text("shaping.band-empty", lowest_hz=self.lowest_hz, highest_hz=self.highest_hz)
+            )
         return self

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from backend.tools.step.evaluate import StepSettings
 from backend.tools.tool import Option, ToolSettings
+from drivers.texts.message import Unsuitable, text
 
 
 class StepRequest(ToolSettings):
@@ -27,6 +28,12 @@ class StepRequest(ToolSettings):
     window: float | None = Field(
         default=None, gt=0, description="settling window in rpm or revolutions; 2 % of the size"
     )
+
+    @model_validator(mode="after")
+    def _some_way(self) -> StepRequest:
+        if self.size == 0.0:
+            raise Unsuitable(text("step.no-size"))
+        return self
 
     @property
     def inner(self) -> StepSettings:

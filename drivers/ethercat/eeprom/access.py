@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from drivers.errors import DriveError, NotAllowed
-from drivers.ethercat.eeprom.image import Image, SlaveIdentity
+from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.ethercat.eeprom.image import MOST_BYTES, UNIT_BYTES, Image, SlaveIdentity
 from drivers.ethercat.eeprom.plan import Plan, plan_identity, plan_restore
 from drivers.link import Address, Progress
 
@@ -30,8 +30,11 @@ class EepromAccess:
 
         Raises:
             Busy: the cyclic exchange runs, or an EEPROM of the segment is being written.
+            OutOfRange: ``size`` is impossible.
             ProtocolError: the EEPROM states an impossible size.
         """
+        if size is not None and (not 0 < size <= MOST_BYTES or size % UNIT_BYTES):
+            raise OutOfRange("ethercat.eeprom-no-image", bytes=size)
         message = {"op": "eeprom_read", "station": station, "size": size}
         return Image(await self._call(message, _READ_S, progress))
 

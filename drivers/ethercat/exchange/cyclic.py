@@ -263,7 +263,7 @@ class CyclicLoop:
         else:
             self.counters.wkc_errors += 1
         self._invalid_run += 1
-        if self._invalid_run == self._distrust and self.moving():
+        if self._invalid_run >= self._distrust and self.moving():
             silent = text("ethercat.no-valid-process-data", cycles=self._invalid_run)
             self.stop_axes(Halted(HaltCause.LOST, note=silent))
 

@@ -71,7 +71,10 @@ class Exchange:
         self._images: list[Image] = []
         self._cycle_ns = 1_000_000
         self._dc = False
-        self._leaving: tuple[float, Done] | None = None
+        self._leaving: float | None = None
+        """Time by which the axes to be stopped are at standstill."""
+        self._stops: list[Done] = []
+        """Stops to be answered when the exchange has ended."""
         self._preparation = Preparation(segment, ring, lanes, report)
         self._healing: set[int] = set()
         self.lockstep = 0.0
@@ -111,7 +114,10 @@ class Exchange:
     # Start and stop ------------------------------------------------------------------------
 
     def start(self, done: Done) -> None:
-        """Exchange process data and bring every configured station to OP."""
+        """Exchange process data and bring every configured station to OP.
+
+        ``done`` is called once, with an error also if the exchange ends or is stopped meanwhile.
+        """
         if not self._images:
             raise NotAllowed("ethercat.configure-cyclic-data-first")
         if self.loop is not None:
@@ -132,16 +138,24 @@ class Exchange:
         loop.start()
         self.loop = loop
         waiting = set(self.setups)
+        unanswered = [done]
+
+        def answer(result: object, error: DriveError | None) -> None:
+            if unanswered:
+                unanswered.pop()(result, error)
 
         def one(number: int) -> Done:
             def reached(_result: object, error: DriveError | None) -> None:
                 waiting.discard(number)
-                if error is not None and self.loop is loop:
-                    self.abandon()
-                    done(None, error)
-                elif not waiting and self.loop is loop:
+                if error is not None:
+                    if self.loop is loop:
+                        self.abandon()
+                    answer(None, error)
+                elif self.loop is not loop or self._stops:
+                    answer(None, NotAllowed("ethercat.cyclic-exchange-not-run"))
+                elif not waiting:
                     self.operational = True
-                    done({"number": loop.number, "time_ns": loop.next_ns}, None)
+                    answer({"number": loop.number, "time_ns": loop.next_ns}, None)
 
             return reached
 
@@ -169,28 +183,29 @@ class Exchange:
         if self.loop is None:
             done(None, None)
             return
+        self._stops.append(done)
+        if len(self._stops) > 1:
+            return
         self.loop.stop_axes(_STOPPING)
         self.operational = False
-        self._leaving = (time.monotonic() + _LEAVE_S, done)
+        self._leaving = time.monotonic() + _LEAVE_S
 
     def housekeeping(self) -> None:
         """Complete a stop once the axes are at standstill."""
         if self._leaving is None or self.loop is None:
             return
-        deadline, done = self._leaving
-        if time.monotonic() < deadline and self._still_enabled():
+        if time.monotonic() < self._leaving and self._still_enabled():
             return
         self._leaving = None
-        waiting = set(self.setups)
+        loop, waiting = self.loop, set(self.setups)
 
         def one(number: int) -> Done:
             def reached(_result: object, error: DriveError | None) -> None:
                 if error is not None:
                     self._report("state", number, error.text)
                 waiting.discard(number)
-                if not waiting:
+                if not waiting and self.loop is loop:
                     self.abandon()
-                    done(None, None)
 
             return reached
 
@@ -206,7 +221,10 @@ class Exchange:
         )
 
     def abandon(self) -> None:
-        """End the exchange at once; the slaves' watchdogs stop any axis that still moves."""
+        """End the exchange at once; the slaves' watchdogs stop any axis that still moves.
+
+        Stops that wait for this are answered.
+        """
         if self.loop is not None:
             self.loop.stop()
         self.loop = None
@@ -214,6 +232,9 @@ class Exchange:
         self._leaving = None
         self.operational = False
         self._healing.clear()
+        stops, self._stops = self._stops, []
+        for done in stops:
+            done(None, None)
 
     def shut_down(self, why: Text) -> None:
         """Brake and disable within half a second, then leave OP. Blocks; only for the shutdown."""

@@ -9,7 +9,7 @@ from drivers.errors import Busy, DriveError, LinkLost, NotAllowed
 from drivers.ethercat.eeprom.transfer import Report, read_image, write_image
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.roster import Roster
-from drivers.ethercat.process.station import Station, answers
+from drivers.ethercat.process.station import Station, answers, with_eeprom
 from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.lanes import Done, Lanes
 from drivers.ethercat.wire.steps import Steps
@@ -29,17 +29,19 @@ class EepromOperations:
         """Read the contents as bytes.
 
         Raises:
-            Busy: the cyclic exchange runs, or an EEPROM is being written.
+            Busy: the cyclic exchange runs, an EEPROM is being written, or firmware is being loaded
+                into the station.
         """
         station = self._calm(message)
         steps = read_image(time.monotonic, self._progress(message), message["size"])
-        self._lanes.submit(station.number, "register", steps, done)
+        self._lanes.submit(station.number, "register", with_eeprom(station, steps), done)
 
     def write(self, message: Message, done: Done) -> None:
         """Write the change from the contents ``present`` to ``target``.
 
         Raises:
-            Busy: the cyclic exchange runs, or an EEPROM is being written.
+            Busy: the cyclic exchange runs, an EEPROM is being written, or firmware is being loaded
+                into the station.
         """
         station = self._calm(message)
         steps = _written(station, message["present"], message["target"], self._progress(message))
@@ -52,13 +54,15 @@ class EepromOperations:
                 self._roster.new_aliases.add(station.number)
             done(result, error)
 
-        self._lanes.submit(station.number, "register", steps, ended)
+        self._lanes.submit(station.number, "register", with_eeprom(station, steps), ended)
 
     def _calm(self, message: Message) -> Station:
         if self._roster.exchange.loop is not None:
             raise Busy("ethercat.segment-busy")
         station = self._roster.station(message)
         self._roster.require_not_held()
+        if station.number in self._roster.loading:
+            raise Busy("ethercat.station-being-loaded-firmware", station=station.number)
         return station
 
 

@@ -12,7 +12,13 @@ from typing import Literal
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.exchange.setup import SYNC_MANAGERS, restore_mailbox
-from drivers.ethercat.process.station import Station, change_state, identify, to_preop
+from drivers.ethercat.process.station import (
+    Station,
+    change_state,
+    identify,
+    to_preop,
+    with_eeprom,
+)
 from drivers.ethercat.wire import foe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.mailbox import Mailbox
@@ -47,7 +53,7 @@ def load(
         Rejected, NotAllowed: the drive refused, as text; it is back in PREOP if possible.
         LinkTimeout, LinkLost: the transfer broke off; the message states how far it got.
     """
-    boot = yield from sii.boot_mailbox(clock)
+    boot = yield from with_eeprom(station, sii.boot_mailbox(clock))
     if where == "BOOT" and boot is None:
         raise NotAllowed("ethercat.station-names-no-mailboxes", station=station.number)
     if boot is not None and where != "PREOP":

@@ -53,7 +53,6 @@ class Operations:
         self._ring = ring
         self._send = send
         self._starved = 0
-        self._loading: set[int] = set()
         self._check: tuple[Check, Done] | None = None
         self._eeprom = EepromOperations(self.roster, self.lanes, self._progress_of)
         self._handlers: dict[str, Callable[[Message, Done], None]] = {
@@ -147,6 +146,7 @@ class Operations:
         self.roster.is_open = False
 
     def _scan(self, message: Message, done: Done) -> None:
+        self.roster.require_not_held()
         wanted = message.get("stations")
         known = wanted is not None and self.roster.knows(wanted)
         if not known:
@@ -351,16 +351,17 @@ class Operations:
                 self.roster.new_aliases.add(station.number)
             done({"alias": reported}, error)
 
-        steps = sii.write_alias(alias, time.monotonic)
+        steps = transactions.with_eeprom(station, sii.write_alias(alias, time.monotonic))
         self.lanes.submit(station.number, "register", steps, ended)
 
     def _foe(self, message: Message, done: Done) -> None:
         station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("ethercat.cyclic-exchange-runs")
+        self.roster.require_not_held()
 
         def ended(where: str | None, error: DriveError | None) -> None:
-            self._loading.discard(station.number)
+            self.roster.loading.discard(station.number)
             done({"state": where}, error)
 
         steps = firmware.load(
@@ -373,7 +374,7 @@ class Operations:
             clock=time.monotonic,
             report=lambda share, step: self._progress(message, share, step),
         )
-        self._loading.add(station.number)
+        self.roster.loading.add(station.number)
         self.lanes.submit(station.number, "mailbox", steps, ended)
 
     def _require_parameters(self, station: Station) -> None:
@@ -388,7 +389,7 @@ class Operations:
             Busy: firmware is being loaded into it.
         """
         station = self.roster.station(message)
-        if station.number in self._loading:
+        if station.number in self.roster.loading:
             raise Busy("ethercat.station-being-loaded-firmware", station=station.number)
         return station
 

@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from drivers.conformance.subject import AlAnswer
-from drivers.errors import NotAllowed
+from drivers.errors import LinkLost, NotAllowed
 from drivers.ethercat.process.station import AL_CONTROL, STATE_TIMEOUT_S, Station, al_status
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.steps import Pause, Steps, Write
@@ -48,15 +48,23 @@ def refuse_op(station: Station, control: int) -> None:
 
 
 def request(station: Station, control: int, clock: Callable[[], float]) -> Steps[list[int]]:
-    """Write 120h; return 130h and 134h after the state or error bit responds, or the time-out."""
+    """Write 120h; return 130h and 134h after the state or error bit responds, or the time-out.
+
+    Raises:
+        LinkLost: the slave answers nothing at all.
+    """
     wanted = control & 0x0F
     known = wanted in set(AlState)
     deadline = clock() + (STATE_TIMEOUT_S[AlState(wanted)] if known else _UNKNOWN_S)
     yield Write(AL_CONTROL, struct.pack("<H", control))
+    answered = False
     while clock() < deadline:
         yield Pause(_WAIT_STEP_S)
         if not (yield from al_status(station)):
             continue
+        answered = True
         if station.al_state == wanted or (station.al_state & ERROR_BIT and station.al_code):
             break
+    if not answered:
+        raise LinkLost("ethercat.station-not-answer-check-drive", station=station.number)
     return [station.al_state, station.al_code]

@@ -47,6 +47,8 @@ class Roster:
         self.new_aliases: set[int] = set()
         self.held: set[int] = set()
         """Stations whose EEPROM is being written: a search would read it meanwhile."""
+        self.loading: set[int] = set()
+        """Stations being loaded with firmware: a search would end that in the middle."""
         self._ring = ring
         self._send = send
         self._next_watch = 0.0
@@ -101,7 +103,8 @@ class Roster:
                 self.lanes.submit(station.number, "mailbox", station.box.drain(), _ignore)
 
     def _search_again(self, now: float) -> None:
-        if now < self._next_open or self.exchange.loop is not None or self._powered or self.held:
+        kept = self._powered or self.held or self.loading
+        if now < self._next_open or self.exchange.loop is not None or kept:
             return
         self._next_open = now + _REOPEN_S
         before = len(self.stations)
@@ -284,10 +287,16 @@ class Roster:
             raise Busy("ethercat.eeprom-being-written", station=min(self.held))
 
     def attach(self) -> None:
-        """Search the segment and create the stations; blocks for as long as SOEM takes."""
+        """Search the segment and create the stations; blocks for as long as SOEM takes.
+
+        Raises:
+            Busy: the exchange runs, an EEPROM is being written, or firmware is being loaded.
+        """
         if self.exchange.loop is not None:
             raise Busy("ethercat.cyclic-exchange-runs-segment")
         self.require_not_held()
+        if self.loading:
+            raise Busy("ethercat.station-being-loaded-firmware", station=min(self.loading))
         self._ring.host_lives_until(
             time.monotonic_ns() + int(_FIND_S * 1e9), "ethercat.doing-search"
         )

@@ -12,12 +12,13 @@ from drivers.ethercat.wire import coe, esc, sii
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
-from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
+from drivers.ethercat.wire.steps import Pause, Read, Steps, T, Write
 from drivers.texts.message import Text, text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130
 _SYNC_MANAGERS, _NO_MAILBOXES = 0x800, 0x0016
 _SERVO = 402
+_TURN_S = 0.002
 
 #: Time-outs of state changes [s] (ETG.1020 clause 5.3.7.2).
 STATE_TIMEOUT_S = {
@@ -67,6 +68,8 @@ class Station:
     """Its ports when all stations last answered: shows what is behind a cable that is now cut."""
     clock_ahead_ns: int | None = None
     """Deviation from the reference clock; None without distributed clock."""
+    eeprom_used: bool = False
+    """A transaction accesses its EEPROM; see `with_eeprom`."""
 
     @property
     def identity(self) -> list[int | None]:
@@ -218,14 +221,14 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
     if (yield from read_ports(station)):
         station.wiring = station.ports
     try:
-        station.serial, right = yield from sii.identity(clock)
+        station.serial, right = yield from with_eeprom(station, sii.identity(clock))
         if not right:
             station.notes.append(text("ethercat.note-eeprom-checksum"))
     except DriveError as error:
         station.notes.append(error.text)
     if station.mailbox is None:
         yield from al_status(station)
-        station.badly_found |= yield from sii.has_mailbox(clock)
+        station.badly_found |= yield from with_eeprom(station, sii.has_mailbox(clock))
         part = "ethercat.note-found-in-part" if station.badly_found else "ethercat.note-no-mailbox"
         station.notes.append(text(part))
         return
@@ -247,6 +250,21 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         yield from _compare_identity(station)
     except DriveError as error:
         station.notes.append(error.text)
+
+
+def with_eeprom(station: Station, steps: Steps[T]) -> Steps[T]:
+    """Run ``steps`` while nothing else accesses the EEPROM of this station.
+
+    Transactions of both lanes use it, with the same registers for address and data: one in between
+    would give the other a wrong word, or have a wrong one written.
+    """
+    while station.eeprom_used:
+        yield Pause(_TURN_S)
+    station.eeprom_used = True
+    try:
+        return (yield from steps)
+    finally:
+        station.eeprom_used = False
 
 
 def to_preop(station: Station, clock: Callable[[], float]) -> Steps[None]:

@@ -46,6 +46,8 @@ _WORTH_WAITING_S = 0.0003
 _LONGEST_WAIT_S, _FIRST_USUAL_S = 0.01, 0.0002
 _LOOKS, _LOOK_AGAIN_S = 4, 40e-6
 _EARLIER, _LATER = 0.997, 0.25
+_MOST_LATE = 32
+"""Mails read after the time-out: the answer may be behind others, but some drives never end."""
 
 
 class Overtaken(LinkTimeout):
@@ -237,6 +239,7 @@ class Mailbox:
         asked = self.clock()
         resend_at = asked + _RESEND_S
         dead, dead_from = 0, asked
+        late = 0
         pause_s = 0.0
         early, looked_at, at_once, repeat_at = yield from self._look(mail, delivered)
         while True:
@@ -259,6 +262,9 @@ class Mailbox:
                 early = None
                 if self.epoch != epoch:
                     return self._kept(matches, answer)
+                late += self.clock() > deadline
+                if late > _MOST_LATE:
+                    raise self._late()
                 if answer is None or self._is_emergency(answer):
                     continue
                 if answer.protocol == MAILBOX_ERROR:
@@ -276,8 +282,7 @@ class Mailbox:
                 yield from self._ask_again()
                 continue
             if now > deadline:
-                self.unsettled = True
-                raise LinkTimeout("ethercat.drive-not-answer-time")
+                raise self._late()
             if not delivered and now > resend_at and not self.stopping:
                 # The same counter: a slave that did receive the mail drops the copy.
                 delivered = (yield Write(self.out_address, mail)) is not None
@@ -285,6 +290,10 @@ class Mailbox:
             if pause_s:
                 yield Pause(pause_s)
             pause_s = min(pause_s + 0.00002, 0.0005)
+
+    def _late(self) -> LinkTimeout:
+        self.unsettled = True
+        return LinkTimeout("ethercat.drive-not-answer-time")
 
     def _look(self, mail: bytes, delivered: bool) -> Steps[_Seen]:
         """Read the mailbox without reading its status, at the time the answer is usually there.

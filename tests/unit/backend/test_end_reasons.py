@@ -399,3 +399,7 @@ async def test_a_bad_request_advises_in_the_language_that_is_asked_for(
     assert answer.status_code == 422
     assert problem["advice"]["code"] == "api.see-interface"
     assert CHINESE.search(problem["remedy"])
+    assert problem["code"] == "input.refused"
+    assert problem["params"]["place"] == problem["parameter"]
+    assert problem["params"]["reason"]["code"] == "input.missing"
+    assert problem["detail"] == f"{problem['parameter']}：缺少此字段"

@@ -7,7 +7,7 @@ import asyncio
 import pytest
 
 from backend.axis.restoring import shielded
-from backend.people.lease import Leases
+from backend.people.lease import Leases, Notice
 from backend.work.jobs import JobRunner, Progress
 from drivers.errors import Busy, LinkLost, LinkTimeout, NotAllowed, OutOfRange
 
@@ -114,6 +114,47 @@ def test_leases() -> None:
     assert leases.drop("c1") == ["x"]
     leases.require("x", "c2")
     assert reported == ["x", "x"]
+
+
+def test_who_asks_is_told_when_somebody_else_gets_control() -> None:
+    now = 0.0
+    notices: list[Notice] = []
+    leases = Leases(ticks=lambda: now)
+    leases.on_notice.append(notices.append)
+
+    def told(connection: str) -> list[tuple[str, str]]:
+        return [(each.kind, each.person) for each in notices if each.connection == connection]
+
+    leases.take("x", "c1", "Anna")
+    leases.ask("x", "c2", "Ben")
+    leases.hand("x", "c1", "c3", "Cara", 60.0)
+    assert leases.asked("x") is None
+    assert told("c2") == [("refused", "Cara")]
+    leases.ask("x", "c2", "Ben")
+    leases.override("x", "c4", "Dora")
+    assert told("c2")[1:] == [("refused", "Dora")]
+    leases.ask("x", "c2", "Ben")
+    leases.hand("x", "c4", "c2", "Ben", 5.0)
+    assert told("c2")[2:] == [("given", "Dora")]
+    leases.ask("x", "c3", "Cara")
+    now = 6.0
+    leases.tick(lambda _drive: False)
+    assert leases.holder("x") is not None
+    assert told("c3")[-1] == ("refused", "Dora"), "control returned to the giver"
+
+
+def test_who_asks_gets_control_that_cannot_return() -> None:
+    now = 0.0
+    leases = Leases(ticks=lambda: now)
+    leases.take("x", "c1", "Anna")
+    leases.hand("x", "c1", "c2", "Ben", 5.0)
+    leases.ask("x", "c3", "Cara")
+    leases.drop("c1")
+    now = 6.0
+    leases.tick(lambda _drive: False)
+    holder = leases.holder("x")
+    assert holder is not None
+    assert holder.person == "Cara"
 
 
 async def test_a_job_that_moves_two_axes_holds_both() -> None:

@@ -239,13 +239,18 @@ async def test_an_axis_that_a_load_pulls_comes_home(
                        ("bus_limits", limits)):  # fmt: skip
         monkeypatch.setattr(go_back_tool, name, made)
     monkeypatch.setattr(go_back_tool, "cycle_s", lambda _session: 1e-3)
-    axis: Any = SimpleNamespace(units=units, position_raw=place)
+    axis: Any = SimpleNamespace(
+        units=units, position_raw=place, drive=SimpleNamespace(name="X axis")
+    )
     facts: Any = SimpleNamespace(rated_torque_nm=1.27)
     envelope = Envelope(4.0, 1500.0, 100.0, 60.0)
-    await go_back_tool.go_back(axis, NOTHING, 0, envelope, facts)
+    going = go_back_tool.go_back(axis, NOTHING, 0, envelope, facts)
     if blocked:
+        with pytest.raises(NotAllowed, match=r"X axis did not come back .* 0\.6 rev"):
+            await going
         assert max(abs(each) for each in asked) < 0.6 + 0.3 + 1e-3, "never far beyond home"
         return
+    await going
     assert abs(at) < 0.05
     assert len(asked) == (2 if pull_rev else 3)
 

@@ -107,6 +107,31 @@ def test_a_limit_switch_that_stops_the_axis_and_one_that_does_not() -> None:
     assert "Nothing happened" in TOOL.text(TOOL.report(ignored).notes[0].name)
 
 
+@pytest.mark.parametrize(
+    "made",
+    [
+        # The torque that holds the axis at the switch, or one that cannot be distinguished.
+        trace(state_at=None, stops_in=50, torque_for=4000),
+        trace(state_at=None, stops_in=50, torque=0.2),
+    ],
+)
+def test_a_limit_of_a_torque_that_was_not_seen_to_go_is_not_met(made: Trace) -> None:
+    found = of("limit_positive", made, torque_free_limit_ms=50.0, stop_limit_ms=80.0)
+    assert (found.verdict, found.torque_free_ms) == ("not_shown", None)
+    assert found.stop_ms == pytest.approx(50.0, abs=20.0)
+
+
+def test_a_limit_of_a_stop_is_not_met_by_an_axis_that_goes_on_at_limited_speed() -> None:
+    made = trace(state_at=None, stops_in=10**9)
+    made.speed_rpm[:] *= 0.8
+    made.commanded_rpm[:AT] *= 0.8
+    made.position_rev[:] = np.cumsum(made.speed_rpm) / 60.0 / RATE
+    known = {"limited_rpm": 0.9 * RPM}
+    assert of("speed_limit", made, **known).verdict == "within_limits"
+    found = of("speed_limit", made, **known, stop_limit_ms=100.0)
+    assert (found.verdict, found.stop_ms) == ("not_shown", None)
+
+
 def test_lost_samples_are_no_proof() -> None:
     made = trace()
     made.valid[AT + 3] = False

@@ -17,10 +17,10 @@ from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.drive_setup import DriveSetup
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.images import Images
-from drivers.canopen.link import _fit
 from drivers.canopen.nodes import NodeWatch, emergency_text
 from drivers.canopen.pdo import PdoPlan, plan, plan_within_load, set_up
 from drivers.canopen.scanning import readable
+from drivers.canopen.sdo import fitted
 from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, OutOfRange, Rejected
 from drivers.halt import HaltCause, Halted
@@ -320,10 +320,10 @@ def test_a_lost_station_is_made_harmless() -> None:
 
 
 def test_padding_is_cut_and_other_bytes_are_kept() -> None:
-    assert _fit(b"\x05\0\0\0", 2) == b"\x05\0"
-    assert _fit(b"\xfe\xff\xff\xff", 2) == b"\xfe\xff"
-    assert _fit(b"\x05\0\x01\0", 2) == b"\x05\0\x01\0"
-    assert _fit(b"\x05", 2) == b"\x05"
+    assert fitted(b"\x05\0\0\0", 2) == b"\x05\0"
+    assert fitted(b"\xfe\xff\xff\xff", 2) == b"\xfe\xff"
+    assert fitted(b"\x05\0\x01\0", 2) == b"\x05\0\x01\0"
+    assert fitted(b"\x05", 2) == b"\x05"
 
 
 def test_version_numbers_and_texts() -> None:

@@ -6,6 +6,7 @@ import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '
 import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
 import { PendingRestoresNote } from '../widgets/PendingRestoresNote'
+import { StateName } from '../widgets/StateName'
 import {
   AXIS_PAGES,
   BENCH_PAGES,
@@ -270,22 +271,16 @@ function StateBadge() {
   const id = useChosen()
   const state = useAxisState(id)
   const look = stateLook(state)
-  const words = !id
-    ? t('frame.noAxis')
-    : !state
-      ? t('state.unknown')
-      : state.fresh
-        ? known(t, 'state', state.state)
-        : t('state.noAnswer')
   return (
-    <span
-      className={`badge ${look.tone}`}
-      role="status"
-      aria-label={t('frame.state')}
-      title={state?.fresh ? state.state : undefined}
-    >
+    <span className={`badge ${look.tone}`} role="status" aria-label={t('frame.state')}>
       <Icon name={look.icon} size={16} />
-      <span>{words}</span>
+      <span>
+        {id && state?.fresh ? (
+          <StateName state={state.state} below />
+        ) : (
+          t(!id ? 'frame.noAxis' : state ? 'state.noAnswer' : 'state.unknown')
+        )}
+      </span>
     </span>
   )
 }

@@ -25,6 +25,7 @@ command_eeprom-ethercat-only = { $value } is not an EtherCAT segment: only its d
     .remedy = give a bus URL that begins with ethercat://
 command_eeprom-not-confirmed = not confirmed: nothing was written
 command_frames-not-recorded = { $value }: its frames are not recorded
+command_give-both = give both { $first } and { $second }, or none of them
 command_give-bus-url-station = give a bus URL and --station, or --server and --axis
     .remedy = see --help
 command_give-either-measurement-files-bus = give either measurement files, or a bus URL and --station, or --server and --axis

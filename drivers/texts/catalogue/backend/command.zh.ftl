@@ -25,6 +25,7 @@ command_eeprom-ethercat-only = { $value } 不是 EtherCAT 网段：只有其驱�
     .remedy = 请给出以 ethercat:// 开头的总线 URL
 command_eeprom-not-confirmed = 未确认：未写入任何内容
 command_frames-not-recorded = { $value }：未记录该总线的报文
+command_give-both = { $first } 和 { $second } 必须同时给出，或都不给出
 command_give-bus-url-station = 请给出总线 URL 和 --station，或 --server 和 --axis
     .remedy = 请参见 --help
 command_give-either-measurement-files-bus = 请给出测量文件，或总线 URL 和 --station，或 --server 和 --axis

@@ -96,3 +96,4 @@ health_trigger-not-permitted = { $drive }: a health check of this axis on reques
 health_undecided = { $name }: a change of { NUM($looked_for_percent, format: ".0f") } % is neither shown nor excluded ({ NUM($low_percent, format: "+.1f") } to { NUM($high_percent, format: "+.1f") } %)
     .remedy = measure again; if the result stays undecided, sign a baseline of more rounds
 health_title = Health check
+health_nothing-chosen = choose at least one measurement

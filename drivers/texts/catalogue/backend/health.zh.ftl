@@ -96,3 +96,4 @@ health_trigger-not-permitted = { $drive }：未许可控制器触发此轴的健
 health_undecided = { $name }：{ NUM($looked_for_percent, format: ".0f") } % 的变化既未证实也未排除（{ NUM($low_percent, format: "+.1f") } 至 { NUM($high_percent, format: "+.1f") } %）
     .remedy = 请再次测量；若仍如此，请签署由更多轮构成的基线
 health_title = 健康检查
+health_nothing-chosen = 请至少选择一项测量

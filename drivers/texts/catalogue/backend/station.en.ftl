@@ -27,6 +27,7 @@ station_drive-station-cannot-list = the drive at station { $station } cannot lis
 station_drive-station-carries-eds = the drive at station { $station } carries its EDS in the maker's own format (1022h = { $packed })
 station_drive-station-not-hold = the settings of the drive at station { $station } of { $url } differ from those of { $drive }: { $parameter } { $key } is { $value } there and { $here } here ({ $different_count } of { $shared_count } differ)
     .remedy = check which drive each cable goes to; if it is the same drive, accept the difference
+station_drive-without-port = a drive needs at least one port
 station_drives-being-searched = { $drive }: { $url }: a scan is running, which may reset the drives
     .remedy = try again when that has ended
 station_enabled-drive = { $drive } is enabled

@@ -27,6 +27,7 @@ station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自
 station_drive-station-carries-eds = 站 { $station } 的驱动器以厂家自有格式存储 EDS（1022h = { $packed }）
 station_drive-station-not-hold = { $url } 站 { $station } 的驱动器与 { $drive } 的设置不符：{ $parameter } { $key } 在驱动器中为 { $value }，此处为 { $here }（{ $shared_count } 项中有 { $different_count } 项不同）
     .remedy = 请检查各电缆所接的驱动器；若是同一驱动器，请接受差异
+station_drive-without-port = 驱动器至少需要一个端口
 station_drives-being-searched = { $drive }：{ $url }：正在搜索驱动器，这可能会复位已有的驱动器
     .remedy = 结束后请重试
 station_enabled-drive = { $drive } 已使能

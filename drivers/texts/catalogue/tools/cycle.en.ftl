@@ -1,4 +1,6 @@
+cycle_ambient-too-warm = ambient_c is as warm as the winding may become: { NUM($ambient_c, format: "g") } °C, limit { NUM($limit_c, format: "g") } °C
 cycle_evaluating = evaluating
+cycle_overload-half = give both overload_percent and overload_s, or none of them
 cycle_reading = reading torque and speed for { NUM($limit_s, format: "g") } s; nothing is written
 cycle_recording-lacks-signal = { QUOTED($value) } has no { $parameter } of { $drive }
     .remedy = record actual torque and actual speed of this drive

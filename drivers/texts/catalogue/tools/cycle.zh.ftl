@@ -1,4 +1,6 @@
+cycle_ambient-too-warm = ambient_c 已达到绕组的允许温度：{ NUM($ambient_c, format: "g") } °C，限值 { NUM($limit_c, format: "g") } °C
 cycle_evaluating = 正在计算
+cycle_overload-half = overload_percent 和 overload_s 必须同时给出，或都不给出
 cycle_reading = 正在读取转矩和速度，共 { NUM($limit_s, format: "g") } s；不写入任何数据
 cycle_recording-lacks-signal = { QUOTED($value) } 中没有 { $drive } 的 { $parameter }
     .remedy = 请录制该驱动器的实际转矩和实际速度

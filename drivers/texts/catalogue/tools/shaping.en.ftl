@@ -1,8 +1,10 @@
+shaping_band-empty = lowest_hz must be below highest_hz: { NUM($lowest_hz, format: "g") } Hz, { NUM($highest_hz, format: "g") } Hz
 shaping_evaluating = evaluating
 shaping_move-beyond-envelope = the move needs { NUM($needed_rpm, format: "g") } rpm and { NUM($needed_rev, format: ".3g") } rev, more than the envelope of { NUM($speed_rpm, format: "g") } rpm and { NUM($travel_rev, format: "g") } rev
     .remedy = choose a shorter or slower move, or a wider envelope
 shaping_no-cyclic-position = { $drive } does not accept a position setpoint in every cycle (CSP), so the shaped move cannot be made
     .remedy = measure the frequency of the vibration in another way, and set the shaper in the controller that generates the setpoints
+shaping_no-size = size must not be 0
 shaping_shaped = moving with the shaper
 shaping_takes-too-long = a move out and back takes { NUM($needed_s, format: ".3g") } s, more than the time limit of { NUM($time_s, format: "g") } s
     .remedy = choose a shorter hold time, a shorter move, or a longer time limit

@@ -1,8 +1,10 @@
+shaping_band-empty = lowest_hz 必须小于 highest_hz：{ NUM($lowest_hz, format: "g") } Hz，{ NUM($highest_hz, format: "g") } Hz
 shaping_evaluating = 正在计算
 shaping_move-beyond-envelope = 该移动需要 { NUM($needed_rpm, format: "g") } rpm 和 { NUM($needed_rev, format: ".3g") } 圈，超过限值 { NUM($speed_rpm, format: "g") } rpm 和 { NUM($travel_rev, format: "g") } 圈
     .remedy = 请缩短或减慢移动，或放宽限值
 shaping_no-cyclic-position = { $drive } 不支持每周期给定位置设定值（CSP），因此无法执行整形后的移动
     .remedy = 请用其他方法测量振动频率，并将整形器置于生成设定值的控制器中
+shaping_no-size = size（移动行程）不能为 0
 shaping_shaped = 带整形器移动
 shaping_takes-too-long = 一次往返移动需要 { NUM($needed_s, format: ".3g") } s，超过时间限值 { NUM($time_s, format: "g") } s
     .remedy = 请缩短保持时间或移动行程，或延长时间限值

@@ -1,0 +1,127 @@
+"""Answers of foreign nodes at bad moments: adapter lost, segments without an end, cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from typing import Any
+
+import can
+import pytest
+
+from drivers.canopen import sdo
+from drivers.canopen.channel import SdoChannel
+from drivers.canopen.link import CanopenLink
+from drivers.canopen.scanning import probe
+from drivers.errors import LinkLost, LinkTimeout, ProtocolError
+
+
+def test_a_lost_adapter_leaves_no_node_occupied() -> None:
+    """A node may answer 1000h in segments, which are aborted; the adapter was gone by then."""
+    lost = False
+    channels: list[SdoChannel] = []
+
+    def send(node: int, data: bytes) -> None:
+        nonlocal lost
+        if lost:
+            raise LinkLost("canopen.bus-lost")
+        if node == 2:
+            lost = True
+            channels[0].deliver(bytes.fromhex("4100100004000000"))
+
+    channels += [SdoChannel(n, lambda data, n=n: send(n, data)) for n in (1, 2)]  # type: ignore[misc]
+    assert list(probe(channels)) == [1]
+    assert [channel._turn.locked() for channel in channels] == [False, False]
+
+
+def test_segments_without_data_and_without_an_end_are_given_up() -> None:
+    """A node that keeps sending empty segments held its transfer, and every later one, for ever."""
+    transfer = sdo.upload(0x1008, 0)
+    next(transfer)
+    transfer.send(bytes.fromhex("4008100000000000"))
+
+    def empty_segments() -> None:
+        for turn in range(1000):
+            transfer.send(bytes([0x0E | (turn & 1) << 4]) + bytes(7))
+
+    with pytest.raises(ProtocolError):
+        empty_segments()
+
+
+def test_a_single_empty_segment_at_the_end_is_none_too_many() -> None:
+    transfer = sdo.upload(0x1008, 0)
+    next(transfer)
+    transfer.send(bytes.fromhex("4008100000000000"))
+    transfer.send(b"\0abcdefg")
+    with pytest.raises(StopIteration) as ended:
+        transfer.send(b"\x1f" + bytes(7))
+    assert ended.value.value == b"abcdefg"
+
+
+async def test_an_opening_that_is_cancelled_leaves_no_adapter_open() -> None:
+    begun, go_on = threading.Event(), threading.Event()
+    closed: list[bool] = []
+
+    class Adapter:
+        def recv(self, timeout: float) -> None:
+            threading.Event().wait(timeout)
+
+        def shutdown(self) -> None:
+            closed.append(True)
+
+    def opener(_url: Any) -> can.BusABC:
+        begun.set()
+        go_on.wait(5)
+        return Adapter()  # type: ignore[return-value]
+
+    link = CanopenLink("canopen://virtual/can0", opener)
+    opening = asyncio.ensure_future(link.open())
+    await asyncio.to_thread(begun.wait, 5)
+    opening.cancel()
+    await asyncio.sleep(0)
+    go_on.set()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    assert closed == [True]
+    await link.close()
+
+
+def test_a_node_that_is_silent_for_long_is_silent_and_no_defect() -> None:
+    """After 262 time-outs (two minutes without power) each access was an internal error.
+
+    It stayed one when the node was back, and a stop was no longer sent.
+    """
+    sent: list[bytes] = []
+    channel = SdoChannel(5, sent.append)
+    for _ in range(600):
+        with pytest.raises(LinkTimeout):
+            channel.read(0x6041, 0, 0.0001)
+    sent.clear()
+    with pytest.raises(LinkTimeout):
+        channel.write(0x6040, 0, b"\x02\0", 0.0001, at_any_rate=True)
+    assert sent[-1] == bytes.fromhex("2b40600002000000")
+
+    def back(request: bytes) -> None:
+        if request[0] == 0x40:
+            missing = request[1:4] != b"\x41\x60\x00"
+            data = bytes.fromhex("00000206" if missing else "37020000")
+            channel.deliver(bytes([0x80 if missing else 0x4B]) + request[1:4] + data)
+
+    channel._send = back
+    assert channel.read(0x6041, 0, 1.0) == b"\x37\x02"
+
+
+def test_the_request_that_shows_a_node_is_back_is_the_oldest_possible() -> None:
+    """Of 255 requests, so that only an answer as old could be taken for its own."""
+    requests: list[bytes] = []
+
+    def send(data: bytes) -> None:
+        if data[0] == 0x40:
+            requests.append(data[1:4])
+
+    channel = SdoChannel(5, send)
+    for _ in range(1000):
+        with pytest.raises(LinkTimeout):
+            channel.read(0x6041, 0, 0.0001)
+    last = requests[-600:]
+    assert all(last[n] not in last[max(n - 254, 0) : n] for n in range(600))

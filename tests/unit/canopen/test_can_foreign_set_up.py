@@ -1,0 +1,112 @@
+"""Set-up of foreign CANopen nodes for process data: odd lengths, refusals half way."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.drive_setup import DriveSetup
+from drivers.canopen.frames import Frame
+from drivers.canopen.pdo import PdoPlan
+from drivers.canopen.url import parse_canopen_url
+from drivers.errors import Rejected
+from drivers.link import Address, CyclicSignal
+
+SPEED = CyclicSignal(5, Address(0x60FF, 0, "INT32"), "speed")
+
+
+class Node:
+    """Objects of one node; ``read_only`` refuses writes, ``padded`` sends four bytes for each."""
+
+    def __init__(
+        self,
+        objects: dict[tuple[int, int], bytes],
+        read_only: frozenset[tuple[int, int]] = frozenset(),
+        *,
+        padded: bool = False,
+    ) -> None:
+        self.objects = objects
+        self._read_only = read_only
+        self._padded = padded
+
+    def read(self, _station: int, index: int, subindex: int) -> bytes:
+        if (index, subindex) not in self.objects:
+            raise Rejected("the drive has no such object", abort_code=0x06020000)
+        data = self.objects[index, subindex]
+        return data.ljust(4, b"\0") if self._padded else data
+
+    def write(self, _station: int, index: int, subindex: int, data: bytes) -> None:
+        if (index, subindex) in self._read_only:
+            raise Rejected("the object can only be read", abort_code=0x06010002)
+        if len(data) != len(self.objects.get((index, subindex), data)):
+            raise Rejected("the length does not fit", abort_code=0x06070010)
+        self.objects[index, subindex] = data
+
+
+def test_a_period_whose_exponent_is_refused_is_no_other_period() -> None:
+    """1.5 ms is 15 x 10^-4 s; 15 with the drive's own exponent -3 would be 15 ms."""
+    node = Node({(0x60C2, 1): b"\x02", (0x60C2, 2): b"\xfd"}, frozenset({(0x60C2, 2)}))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.interpolate(5, 0.0015)
+    assert node.objects == {(0x60C2, 1): b"\x02", (0x60C2, 2): b"\xfd"}
+    setup.undo()
+
+
+def test_a_period_with_the_exponent_that_the_drive_has_anyway() -> None:
+    node = Node({(0x60C2, 1): b"\x02", (0x60C2, 2): b"\xfd"}, frozenset({(0x60C2, 2)}))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.interpolate(5, 0.004)
+    assert node.objects[0x60C2, 1] == b"\x04"
+    setup.undo()
+    assert node.objects == {(0x60C2, 1): b"\x02", (0x60C2, 2): b"\xfd"}
+
+
+def test_a_node_that_sends_four_bytes_for_every_object_gets_its_pdos_back() -> None:
+    """CiA 301 lets a server leave the size out of an expedited answer: then there are four."""
+    mapping = {
+        (0x1400, 1): struct.pack("<I", 0x205),
+        (0x1400, 2): b"\xff",
+        (0x1600, 0): b"\x01",
+        (0x1600, 1): struct.pack("<I", 0x60400010),
+        (0x60C2, 1): b"\x02",
+        (0x60C2, 2): b"\xfd",
+    }
+    node = Node(dict(mapping), padded=True)
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.interpolate(5, 0.004)
+    assert node.objects[0x1600, 1] == struct.pack("<I", 0x60FF0020)
+    setup.undo()
+    assert node.objects == mapping
+
+
+async def test_the_exchange_starts_from_values_that_come_with_four_bytes() -> None:
+    """A legal answer without a size ended the start with "has 4 bytes instead of 2"."""
+    node = Node(
+        {
+            (0x1400, 1): struct.pack("<I", 0x205),
+            (0x1400, 2): b"\xff",
+            (0x1600, 0): b"\0",
+            (0x6040, 0): b"\x06\0",
+        },
+        padded=True,
+    )
+    url = parse_canopen_url("canopen://virtual/can0")
+    sent: list[Frame] = []
+    port: Any = SimpleNamespace(send=sent.append)
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    cyclic = CanopenCyclic(port, url, node.read, node.write, at_once)
+    signal = CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")
+    await cyclic.configure([], [signal], 0.01)
+    await cyclic.start()
+    try:
+        assert cyclic.running
+    finally:
+        await cyclic.stop()
+    assert node.objects[0x1400, 2] == b"\xff"

@@ -1,0 +1,146 @@
+"""Ends of motions in the loop of an axis: no setpoint but those of this motion and its ramp."""
+
+from __future__ import annotations
+
+import array
+import itertools
+
+import pytest
+
+from drivers.cia402 import Mode, State
+from drivers.errors import NotAllowed
+from drivers.halt import HaltCause, Halted
+from drivers.motion.playback import STOP_S, AxisLoop
+from drivers.motion.setpoint_plan import (
+    ACTUAL_POSITION,
+    CONTROL,
+    MODE_SHOWN,
+    POSITION,
+    STATUS,
+    TORQUE,
+    VELOCITY,
+    Limits,
+    Motion,
+    Phase,
+)
+
+OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
+ENABLED, DISABLED, FAULT = 0x0237, 0x0250, 0x0218
+RAMP = round(STOP_S / 0.001)
+RELEASED = Halted(HaltCause.COMMANDED)
+
+
+class Bench:
+    """An enabled axis of a drive that follows each word of the test."""
+
+    def __init__(self, position: int, mode: Mode) -> None:
+        self.axis = AxisLoop(
+            1,
+            inputs={STATUS: 0, ACTUAL_POSITION: 1, MODE_SHOWN: 2},
+            outputs=OUT,
+            output_count=len(OUT),
+            cycle_s=0.001,
+            report=lambda _station, _why: None,
+        )
+        self.status, self.position, self.mode = DISABLED, position, mode
+        self.step()
+        self.axis.drive_to(State.OPERATION_ENABLED, None)
+        for self.status in (DISABLED, 0x0231, 0x0233, ENABLED):
+            self.step()
+
+    def step(self, cycles: int = 1) -> None:
+        for _ in range(cycles):
+            self.axis.step((self.status, self.position, int(self.mode)))
+
+    def out(self, index: int) -> int:
+        return self.axis.outputs[OUT[index]]
+
+    def play(self, target: int, values: list[int], limits: Limits | None = None) -> None:
+        steps = [abs(b - a) for a, b in itertools.pairwise(values)]
+        longest = max(steps, default=0)
+        self.axis.play(Motion(target, array.array("q", values), limits or Limits(), 5000, longest))
+
+
+@pytest.mark.parametrize("by", ["command", "envelope"])
+def test_a_velocity_that_ends_before_its_first_value_takes_no_earlier_setpoint(by: str) -> None:
+    bench = Bench(1_000_000, Mode.CSP)
+    bench.play(POSITION, [1_000_000] * 2)
+    bench.step(3)
+    bench.axis.pause()
+    bench.step(RAMP + 1)
+    assert bench.axis.phase is Phase.IDLE
+    bench.mode = Mode.CSV
+    bench.step()
+    bench.play(VELOCITY, [0] * 50, Limits(position_max=900_000 if by == "envelope" else None))
+    if by == "command":
+        bench.axis.stop(RELEASED)
+    seen = set()
+    for _ in range(RAMP + 2):
+        bench.step()
+        seen.add(bench.out(VELOCITY))
+    assert seen == {0}
+
+
+def test_a_limit_of_the_following_error_without_anything_to_compute_it_from_is_refused() -> None:
+    bench = Bench(0, Mode.CSV)
+    with pytest.raises(NotAllowed, match="60F4h is not mapped"):
+        bench.play(VELOCITY, [0] * 50, Limits(following_error_max=50))
+    bench.mode = Mode.CSP
+    bench.step()
+    bench.play(POSITION, [0] * 50, Limits(following_error_max=50))
+    assert bench.axis.phase is Phase.PLAYING
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_ramp_ends_at_the_limit_of_the_type_and_the_axis_is_disabled(sign: int) -> None:
+    begin = sign * (2**31 - 1 - 20_000)
+    bench = Bench(begin, Mode.CSP)
+    path = [begin + sign * 1000 * n for n in range(20)]
+    bench.play(POSITION, path)
+    bench.step(len(path) - 1)
+    bench.axis.stop(RELEASED)
+    seen = []
+    for _ in range(RAMP + 5):
+        bench.position = bench.out(POSITION)
+        bench.step()
+        seen.append(bench.out(POSITION))
+    assert all(-(2**31) <= value < 2**31 for value in seen), "it fits its object"
+    assert bench.out(CONTROL) == 0x06
+
+
+def test_a_reset_of_a_fault_leaves_an_axis_without_fault_as_it_is() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.play(POSITION, [10 * n for n in range(200)])
+    bench.step(10)
+    bench.axis.reset_fault()
+    bench.step()
+    assert bench.out(CONTROL) == 0x0F
+    assert bench.axis.phase is Phase.PLAYING
+
+
+def test_a_fault_that_stays_is_not_reset_by_itself_long_after_the_command() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.status = FAULT
+    bench.step(5)
+    bench.axis.reset_fault()
+    words = []
+    for _ in range(10_000):
+        bench.step()
+        words.append(bench.out(CONTROL) & 0x80)
+    assert 0x80 in words[:10]
+    assert not any(words[5000:])
+    bench.axis.reset_fault()
+    bench.step()
+    assert bench.out(CONTROL) & 0x80, "another command resets it again"
+
+
+def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
+    bench = Bench(0, Mode.CSP)
+    some = array.array("q", [0] * 50)
+    offsets = array.array("q", [70] * 50)
+    bench.axis.play(Motion(POSITION, some, Limits(), 5000, 0, 0x60B2, offsets))
+    bench.step(10)
+    assert bench.out(0x60B2) == 70
+    bench.play(POSITION, [0] * 50)
+    bench.step()
+    assert bench.out(0x60B2) == 0
