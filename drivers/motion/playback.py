@@ -102,6 +102,8 @@ class AxisLoop:
         self._rest_cycles = max(round(_REST_S / cycle_s), 1)
         self._rested = self._stopping = 0
         self._brakes_itself = False
+        self._completes_stop = False
+        """Another goal was given during a quick stop."""
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
         self._mode: int | None = None
         self._motion: Motion | None = None
@@ -139,6 +141,8 @@ class AxisLoop:
     def drive_to(self, goal: State, mode: int | None) -> None:
         """Request a power state; leaving Operation enabled brakes first.
 
+        During a quick stop it is approached only once the axis rests.
+
         Raises:
             NotAllowed: the control word is not mapped, the axis is in a fault or braking, or the
                 mode would change during a motion.
@@ -167,6 +171,9 @@ class AxisLoop:
                 self._after_brake = goal
             self.stop(_DISABLED, goal)
             return
+        if self.goal is State.QUICK_STOP_ACTIVE and goal is not State.QUICK_STOP_ACTIVE:
+            self._completes_stop = True
+            self._rested = self._stopping = 0
         self.goal = goal
 
     def reset_fault(self) -> None:
@@ -478,6 +485,12 @@ class AxisLoop:
                 self.outputs[place] = self._dialect.quick_stop
                 return
             self._brakes_itself = False
+        if self._completes_stop:
+            stopping = self.state in _ALIVE_STATES or self._dialect.echoes_control
+            if stopping and self._may_brake():
+                self.outputs[place] = self._dialect.quick_stop
+                return
+            self._completes_stop = False
         if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
             if self._stops_unseen():
                 return

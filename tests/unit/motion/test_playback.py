@@ -25,7 +25,7 @@ from drivers.motion.setpoint_plan import (
 )
 
 OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
-ENABLED, DISABLED, FAULT = 0x0237, 0x0250, 0x0218
+ENABLED, DISABLED, FAULT, QUICK_STOP = 0x0237, 0x0250, 0x0218, 0x0217
 RAMP = round(STOP_S / 0.001)
 RELEASED = Halted(HaltCause.COMMANDED)
 
@@ -144,3 +144,29 @@ def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
     bench.play(POSITION, [0] * 50)
     bench.step()
     assert bench.out(0x60B2) == 0
+
+
+@pytest.mark.parametrize("goal", [State.SWITCH_ON_DISABLED, State.OPERATION_ENABLED])
+@pytest.mark.parametrize("reached", [False, True])
+def test_a_goal_given_during_a_quick_stop_waits_until_the_axis_rests(
+    goal: State, reached: bool
+) -> None:
+    """Disabled in the middle of it, the axis would coast."""
+    bench = Bench(0, Mode.CST)
+    bench.play(TORQUE, [100] * 500)
+    for _ in range(50):
+        bench.position += 20
+        bench.step()
+    bench.axis.stop(RELEASED)
+    if reached:
+        bench.step()
+        bench.status = QUICK_STOP
+        bench.step()
+    bench.axis.drive_to(goal, None)
+    for _ in range(200):
+        bench.position += 10
+        bench.step()
+        assert bench.out(CONTROL) == 0x02, "it still turns"
+        bench.status = QUICK_STOP
+    bench.step(60)
+    assert bench.out(CONTROL) == 0x00
