@@ -561,7 +561,7 @@ class AxisLoop:
                 mode_names=cia402.MODE_NAMES[wanted],
             )
         motion.limits.require_watched(self._in, where, motion.target)
-        if self.phase is Phase.BRAKING:
+        if self.phase is Phase.BRAKING or self._completes_stop:
             raise NotAllowed("cyclic.braking", where=where, why=self._why)
         if not len(motion.values):
             raise NotAllowed("cyclic.trajectory-without-values", where=where)

@@ -170,3 +170,14 @@ def test_a_goal_given_during_a_quick_stop_waits_until_the_axis_rests(
         bench.status = QUICK_STOP
     bench.step(60)
     assert bench.out(CONTROL) == 0x00
+
+
+def test_no_motion_begins_during_a_quick_stop_that_the_drive_does_not_show_yet() -> None:
+    bench = Bench(0, Mode.CST)
+    bench.play(TORQUE, [100] * 500)
+    bench.step(50)
+    bench.axis.stop(RELEASED)
+    bench.axis.drive_to(State.OPERATION_ENABLED, None)
+    bench.step()
+    with pytest.raises(NotAllowed, match="brak"):
+        bench.play(TORQUE, [100] * 500)
