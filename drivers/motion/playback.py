@@ -54,6 +54,14 @@ _RESTLESS = 2
 """Encoder noise of an axis at standstill, in increments per cycle."""
 _LOWEST, _HIGHEST = INTEGER_RANGE["INT32"]
 """Range of a position setpoint [increments] (CiA 402-2, 607Ah)."""
+_WITHOUT_POSITION = (
+    cia402.Mode.VL,
+    cia402.Mode.PV,
+    cia402.Mode.PT,
+    cia402.Mode.CSV,
+    cia402.Mode.CST,
+)
+"""Modes in which a drive does not follow 607Ah."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
@@ -402,11 +410,13 @@ class AxisLoop:
 
     def _setpoints(self, values: Sequence[int], *, enabled: bool) -> None:
         if self.phase is Phase.IDLE:
-            if not enabled:
-                # Enabling must never cause motion: the setpoint is kept at the actual position.
+            if not enabled or self._mode in _WITHOUT_POSITION:
+                # Neither enabling nor a change of mode may cause motion: the setpoint is kept at
+                # the actual position as long as the drive does not follow it.
                 actual = self._value(values, ACTUAL_POSITION)
                 if actual is not None:
                     self._set(POSITION, round(actual))
+            if not enabled:
                 self._set(VELOCITY, 0)
                 self._set(TORQUE, 0)
                 self._clear_offsets()

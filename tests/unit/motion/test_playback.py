@@ -181,3 +181,20 @@ def test_no_motion_begins_during_a_quick_stop_that_the_drive_does_not_show_yet()
     bench.step()
     with pytest.raises(NotAllowed, match="brak"):
         bench.play(TORQUE, [100] * 500)
+
+
+def test_a_change_to_csp_of_an_enabled_axis_does_not_pull_it_back() -> None:
+    """Enabled without torque it was turned by hand; the target was still where it was enabled."""
+    bench = Bench(0, Mode.CST)
+    for _ in range(100):
+        bench.position += 1000
+        bench.step()
+    assert bench.axis.state is State.OPERATION_ENABLED
+    bench.axis.drive_to(State.OPERATION_ENABLED, Mode.CSP)
+    bench.step()
+    assert bench.out(POSITION) == bench.position
+    bench.mode = Mode.CSP
+    bench.step()
+    bench.position += 7
+    bench.step()
+    assert bench.out(POSITION) == bench.position - 7, "from now on it is held there"
