@@ -40,9 +40,20 @@ def test_no_search_ends_a_download_of_firmware(clock: Clock) -> None:
     assert wire.searches == 2
 
 
-@pytest.mark.parametrize("request_", [{"op": "scan", "stations": [1]}, {"op": "foe", "station": 1}])
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"op": "scan", "stations": [1]},
+        {"op": "foe", "station": 1},
+        {"op": "state", "station": 2, "state": "SAFEOP"},
+        {"op": "al_request", "station": 2, "control": 1},
+    ],
+)
 def test_no_station_is_touched_while_an_eeprom_is_written(request_: dict[str, Any]) -> None:
-    """A scan of known stations searches nothing, but brings each to PREOP and reads its EEPROM."""
+    """A scan of known stations searches nothing, but brings each to PREOP and reads its EEPROM.
+
+    In Safe-Op and Op the processor of a drive may use the EEPROM.
+    """
     ring: Any = SimpleNamespace(host_lives_until=lambda *_what: None)
     operations = Operations("eth9", ring, lambda _message: None)
     made = operations.roster
