@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.errors import Busy
+from drivers.errors import Busy, LinkLost
 from drivers.ethercat.process import roster as watched
 from drivers.ethercat.process.operations import Operations
 from drivers.ethercat.process.station import Station
@@ -62,3 +62,24 @@ def test_no_station_is_touched_while_an_eeprom_is_written(request_: dict[str, An
     with pytest.raises(Busy, match="EEPROM of station 2 is being written"):
         operations.handle(request_ | {"id": 1}, lambda _result, _error: None)
     assert not operations.lanes.pending()
+
+
+def test_a_search_that_fails_is_repeated_and_does_not_end_the_process(clock: Clock) -> None:
+    made, wire, _, events = roster(2)
+    assert ask(made, 1)
+    made.stations[1].badly_found = True
+    find = wire.find
+
+    def other_master() -> int:
+        raise LinkLost("ethercat.answers-come-too-late", interface="eth9")
+
+    wire.find = other_master  # type: ignore[method-assign]
+    for _ in range(20):
+        clock.now += 0.25
+        made.housekeeping(clock.now)
+    assert events.count("fault") == 1, "it is said once"
+    wire.find = find  # type: ignore[method-assign]
+    clock.now += 1.1
+    made.housekeeping(clock.now)
+    assert wire.searches == 2
+    assert not made.stations[1].badly_found
