@@ -484,7 +484,7 @@ class AxisLoop:
         if self.goal is None:
             return
         if self.state in (State.FAULT, State.FAULT_REACTION):
-            self._reset_left -= 1
+            self._reset_left -= self.state is State.FAULT
             if not self._reset or self._reset_left < 0:
                 self._reset = False
                 self.outputs[place] = cia402.DISABLE_VOLTAGE

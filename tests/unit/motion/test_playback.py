@@ -25,7 +25,7 @@ from drivers.motion.setpoint_plan import (
 )
 
 OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
-ENABLED, DISABLED, FAULT, QUICK_STOP = 0x0237, 0x0250, 0x0218, 0x0217
+ENABLED, DISABLED, FAULT, FAULT_REACTION, QUICK_STOP = 0x0237, 0x0250, 0x0218, 0x021F, 0x0217
 RAMP = round(STOP_S / 0.001)
 RELEASED = Halted(HaltCause.COMMANDED)
 
@@ -132,6 +132,17 @@ def test_a_fault_that_stays_is_not_reset_by_itself_long_after_the_command() -> N
     bench.axis.reset_fault()
     bench.step()
     assert bench.out(CONTROL) & 0x80, "another command resets it again"
+
+
+def test_a_fault_whose_reaction_takes_long_is_reset_after_it() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.status = FAULT_REACTION
+    bench.step(5)
+    bench.axis.reset_fault()
+    bench.step(5000)
+    bench.status = FAULT
+    bench.step()
+    assert bench.out(CONTROL) & 0x80
 
 
 def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
