@@ -29,7 +29,7 @@ def can_ring(channel: str) -> FrameRing:
 
 def serial_ring(device: str) -> FrameRing:
     """Create a ring for the bytes of a serial line; see `pcapng.SERIAL_USER`."""
-    return FrameRing(SERIAL_USER, device, _of_address)
+    return FrameRing(SERIAL_USER, device, _of_address, answers_follow=True)
 
 
 def can_data(cob_id: int, data: bytes, remote: bool) -> bytes:

@@ -6,7 +6,7 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from drivers.flight.pcapng import Frame, Note, file_of
 
@@ -43,7 +43,13 @@ class FrameRing:
         belongs: Belongs,
         max_bytes: int = MAX_BYTES,
         unpack: Unpack = one_frame,
+        *,
+        answers_follow: bool = False,
     ) -> None:
+        """``answers_follow``: what is received belongs to the station of the last request.
+
+        On a serial line only the first portion of an answer shows whose it is.
+        """
         self.link_type = link_type
         self.name = name
         self.dropped = 0
@@ -51,6 +57,7 @@ class FrameRing:
         self._belongs = belongs
         self._max_bytes = max_bytes
         self._unpack = unpack
+        self._answers_follow = answers_follow
         self._held: deque[tuple[int, int, bytes]] = deque()
         """Time of the last frame, number of frames, the frames."""
         self._bytes = 0
@@ -86,12 +93,8 @@ class FrameRing:
         """Return the present contents as a pcapng file; with a station, only what concerns it."""
         with self._lock:
             held, notes = list(self._held), list(self._notes)
-        frames = [
-            frame
-            for _, _, packed in held
-            for frame in self._unpack(packed)
-            if station is None or self._belongs(frame.data, station)
-        ]
+        every = (frame for _, _, packed in held for frame in self._unpack(packed))
+        frames = list(every if station is None else self._of_station(every, station))
         oldest_ns = time.time_ns() - KEPT_NS
         chosen = [
             note
@@ -99,3 +102,14 @@ class FrameRing:
             if note.time_ns >= oldest_ns and (station is None or note.station in (None, station))
         ]
         return file_of(frames, chosen, self.link_type, self.name)
+
+    def _of_station(self, frames: Iterable[Frame], station: int) -> Iterator[Frame]:
+        asked: bool | None = None
+        for frame in frames:
+            if frame.sent or asked is None or not self._answers_follow:
+                belongs = self._belongs(frame.data, station)
+                asked = belongs if frame.sent else asked
+            else:
+                belongs = asked
+            if belongs:
+                yield frame

@@ -54,6 +54,14 @@ _RESTLESS = 2
 """Encoder noise of an axis at standstill, in increments per cycle."""
 _LOWEST, _HIGHEST = INTEGER_RANGE["INT32"]
 """Range of a position setpoint [increments] (CiA 402-2, 607Ah)."""
+_WITHOUT_POSITION = (
+    cia402.Mode.VL,
+    cia402.Mode.PV,
+    cia402.Mode.PT,
+    cia402.Mode.CSV,
+    cia402.Mode.CST,
+)
+"""Modes in which a drive does not follow 607Ah."""
 _ALIVE_STATES = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)
 _STANDARD = cia402.Dialect()
 _DISABLED = Halted(HaltCause.COMMANDED, note=text("cyclic.axis-being-disabled"))
@@ -102,6 +110,8 @@ class AxisLoop:
         self._rest_cycles = max(round(_REST_S / cycle_s), 1)
         self._rested = self._stopping = 0
         self._brakes_itself = False
+        self._completes_stop = False
+        """Another goal was given during a quick stop."""
         self._stop_cycles = max(round(STOP_S / cycle_s), 1)
         self._mode: int | None = None
         self._motion: Motion | None = None
@@ -139,6 +149,8 @@ class AxisLoop:
     def drive_to(self, goal: State, mode: int | None) -> None:
         """Request a power state; leaving Operation enabled brakes first.
 
+        During a quick stop it is approached only once the axis rests.
+
         Raises:
             NotAllowed: the control word is not mapped, the axis is in a fault or braking, or the
                 mode would change during a motion.
@@ -167,6 +179,9 @@ class AxisLoop:
                 self._after_brake = goal
             self.stop(_DISABLED, goal)
             return
+        if self.goal is State.QUICK_STOP_ACTIVE and goal is not State.QUICK_STOP_ACTIVE:
+            self._completes_stop = True
+            self._rested = self._stopping = 0
         self.goal = goal
 
     def reset_fault(self) -> None:
@@ -395,11 +410,13 @@ class AxisLoop:
 
     def _setpoints(self, values: Sequence[int], *, enabled: bool) -> None:
         if self.phase is Phase.IDLE:
-            if not enabled:
-                # Enabling must never cause motion: the setpoint is kept at the actual position.
+            if not enabled or self._mode in _WITHOUT_POSITION:
+                # Neither enabling nor a change of mode may cause motion: the setpoint is kept at
+                # the actual position as long as the drive does not follow it.
                 actual = self._value(values, ACTUAL_POSITION)
                 if actual is not None:
                     self._set(POSITION, round(actual))
+            if not enabled:
                 self._set(VELOCITY, 0)
                 self._set(TORQUE, 0)
                 self._clear_offsets()
@@ -467,7 +484,7 @@ class AxisLoop:
         if self.goal is None:
             return
         if self.state in (State.FAULT, State.FAULT_REACTION):
-            self._reset_left -= 1
+            self._reset_left -= self.state is State.FAULT
             if not self._reset or self._reset_left < 0:
                 self._reset = False
                 self.outputs[place] = cia402.DISABLE_VOLTAGE
@@ -478,6 +495,12 @@ class AxisLoop:
                 self.outputs[place] = self._dialect.quick_stop
                 return
             self._brakes_itself = False
+        if self._completes_stop:
+            stopping = self.state in _ALIVE_STATES or self._dialect.echoes_control
+            if stopping and self._may_brake():
+                self.outputs[place] = self._dialect.quick_stop
+                return
+            self._completes_stop = False
         if self.goal is State.QUICK_STOP_ACTIVE and self.state not in _ALIVE_STATES:
             if self._stops_unseen():
                 return
@@ -548,7 +571,7 @@ class AxisLoop:
                 mode_names=cia402.MODE_NAMES[wanted],
             )
         motion.limits.require_watched(self._in, where, motion.target)
-        if self.phase is Phase.BRAKING:
+        if self.phase is Phase.BRAKING or self._completes_stop:
             raise NotAllowed("cyclic.braking", where=where, why=self._why)
         if not len(motion.values):
             raise NotAllowed("cyclic.trajectory-without-values", where=where)

@@ -231,7 +231,9 @@ def initial_outputs(station: Station, entries: Sequence[Entry]) -> Steps[list[in
         if entry.index not in _SETPOINTS:
             try:
                 data = yield from coe.upload(station.box, entry.index, entry.subindex)
-                (value,) = struct.unpack("<" + entry.code, data)
+                # Some drives state no length, or a longer one: the rest is padding.
+                held = data[: entry.size] if not any(data[entry.size :]) else data
+                (value,) = struct.unpack("<" + entry.code, held)
             except (Rejected, struct.error):
                 key = f"{entry.index:04X}:{entry.subindex:02X}"
                 station.notes.append(text("ethercat.note-starts-at-zero", parameter=key))

@@ -118,6 +118,7 @@ class HostProcess:
         Raises:
             LinkLost: the child does not run, or ended meanwhile.
             LinkTimeout: no reply in time.
+            ProtocolError: the request is too long.
             DriveError: the error that the child reports.
         """
         if not self.running or self._channel is None:
@@ -125,12 +126,14 @@ class HostProcess:
                 "ethercat.ethercat-process-not-running", interface=self._interface, words=self.why
             )
         number = next(self._numbers)
+        packed = protocol.pack(message | {"id": number})
+        protocol.require_length(len(packed))
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (future, progress)
         try:
             # A truncated message would corrupt those after it, a halt among them: when the caller
             # gives up waiting (STOP cancels a motion), the message is still sent completely.
-            sending = asyncio.create_task(self._write(protocol.pack(message | {"id": number})))
+            sending = asyncio.create_task(self._write(packed))
             sending.add_done_callback(_noticed)
             await asyncio.shield(sending)
             async with asyncio.timeout(timeout_s):

@@ -267,6 +267,7 @@ class Operations:
         station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("ethercat.cyclic-exchange-owns-states")
+        self.roster.require_not_held()
         target = AlState[message["state"]]
         if target is AlState.OP:
             raise NotAllowed("ethercat.op-needs-cyclic-data")
@@ -277,6 +278,7 @@ class Operations:
         station = self._calm_station(message)
         if self.loop is not None:
             raise Busy("ethercat.cyclic-exchange-owns-states")
+        self.roster.require_not_held()
         refuse_op(station, message["control"])
         steps = request(station, message["control"], time.monotonic)
         self.lanes.submit(station.number, "mailbox", steps, done)

@@ -50,6 +50,16 @@ def pack(message: Message) -> bytes:
     return _LENGTH.pack(len(body)) + body
 
 
+def require_length(length: int) -> None:
+    """Require that the other side accepts a message of this length.
+
+    Raises:
+        ProtocolError: it is above `MAX_MESSAGE_BYTES`.
+    """
+    if length > MAX_MESSAGE_BYTES:
+        raise errors.ProtocolError("ethercat.message-bytes-between-our", length_bytes=length)
+
+
 class Unpacker:
     """Collects bytes and returns complete messages."""
 
@@ -66,10 +76,7 @@ class Unpacker:
         found: list[Message] = []
         while len(self._buffer) >= 4:
             (length,) = _LENGTH.unpack_from(self._buffer)
-            if length > MAX_MESSAGE_BYTES:
-                raise errors.ProtocolError(
-                    "ethercat.message-bytes-between-our", length_bytes=length
-                )
+            require_length(length)
             if len(self._buffer) < 4 + length:
                 break
             body = bytes(self._buffer[4 : 4 + length])

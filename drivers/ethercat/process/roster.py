@@ -54,6 +54,8 @@ class Roster:
         self._next_watch = 0.0
         self._next_open = 0.0
         self._search_due = False
+        self._search_failed: Text | None = None
+        """Why the last search failed, which is reported once."""
         self._wanted, self._wanted_at = 0, 0.0
         self._repairing: dict[int, tuple[int, float]] = {}
         #: Stations enabled by their last control word over the mailbox: no search may reset them.
@@ -109,7 +111,16 @@ class Roster:
         self._next_open = now + _REOPEN_S
         before = len(self.stations)
         self._search_due = False
-        self.attach_and_identify()
+        try:
+            self.attach_and_identify()
+        except DriveError as error:
+            # Another master, or too many slaves: it is tried again, as nobody asked for it.
+            self._search_due = True
+            if error.text != self._search_failed:
+                self._search_failed = error.text
+                self.event("fault", None, error.text)
+            return
+        self._search_failed = None
         if len(self.stations) != before:
             self._wanted, self._search_due = 0, True
         elif not self._search_due:

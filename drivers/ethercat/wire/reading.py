@@ -9,7 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from drivers.dictionary import Described
-from drivers.errors import DriveError, LinkLost, LinkTimeout, NotInUse, Rejected
+from drivers.errors import (
+    DriveError,
+    LinkLost,
+    LinkTimeout,
+    NotInUse,
+    ProtocolError,
+    Rejected,
+)
 from drivers.ethercat.process.station import Station
 from drivers.ethercat.wire import coe, information
 from drivers.ethercat.wire.steps import Gap, Steps
@@ -164,20 +171,23 @@ def _prove(station: Station, index: int, sizes: dict[int, int], singles: dict[in
 def enumerate_objects(
     station: Station, on_progress: Callable[[int, int], None]
 ) -> Steps[list[Described]]:
-    """Read every object and entry that the drive's own dictionary lists."""
+    """Read every object and entry that the drive's own dictionary lists.
+
+    What the drive refuses to describe, or describes in a way that cannot be read, is left out.
+    """
     indices = yield from information.list_objects(station.box)
     found: list[Described] = []
     for number, index in enumerate(indices):
         on_progress(number, len(indices))
         try:
             info = yield from information.describe_object(station.box, index)
-        except Rejected:
+        except (Rejected, ProtocolError):
             continue
         found.append(info)
         for sub in range(info.max_subindex + 1):
             yield Gap()
             try:
                 found.append((yield from information.describe_entry(station.box, index, sub)))
-            except Rejected:
+            except (Rejected, ProtocolError):
                 continue
     return found

@@ -25,7 +25,7 @@ from drivers.motion.setpoint_plan import (
 )
 
 OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
-ENABLED, DISABLED, FAULT = 0x0237, 0x0250, 0x0218
+ENABLED, DISABLED, FAULT, FAULT_REACTION, QUICK_STOP = 0x0237, 0x0250, 0x0218, 0x021F, 0x0217
 RAMP = round(STOP_S / 0.001)
 RELEASED = Halted(HaltCause.COMMANDED)
 
@@ -134,6 +134,17 @@ def test_a_fault_that_stays_is_not_reset_by_itself_long_after_the_command() -> N
     assert bench.out(CONTROL) & 0x80, "another command resets it again"
 
 
+def test_a_fault_whose_reaction_takes_long_is_reset_after_it() -> None:
+    bench = Bench(0, Mode.CSP)
+    bench.status = FAULT_REACTION
+    bench.step(5)
+    bench.axis.reset_fault()
+    bench.step(5000)
+    bench.status = FAULT
+    bench.step()
+    assert bench.out(CONTROL) & 0x80
+
+
 def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
     bench = Bench(0, Mode.CSP)
     some = array.array("q", [0] * 50)
@@ -144,3 +155,57 @@ def test_an_offset_of_an_earlier_motion_does_not_stay_in_the_next() -> None:
     bench.play(POSITION, [0] * 50)
     bench.step()
     assert bench.out(0x60B2) == 0
+
+
+@pytest.mark.parametrize("goal", [State.SWITCH_ON_DISABLED, State.OPERATION_ENABLED])
+@pytest.mark.parametrize("reached", [False, True])
+def test_a_goal_given_during_a_quick_stop_waits_until_the_axis_rests(
+    goal: State, reached: bool
+) -> None:
+    """Disabled in the middle of it, the axis would coast."""
+    bench = Bench(0, Mode.CST)
+    bench.play(TORQUE, [100] * 500)
+    for _ in range(50):
+        bench.position += 20
+        bench.step()
+    bench.axis.stop(RELEASED)
+    if reached:
+        bench.step()
+        bench.status = QUICK_STOP
+        bench.step()
+    bench.axis.drive_to(goal, None)
+    for _ in range(200):
+        bench.position += 10
+        bench.step()
+        assert bench.out(CONTROL) == 0x02, "it still turns"
+        bench.status = QUICK_STOP
+    bench.step(60)
+    assert bench.out(CONTROL) == 0x00
+
+
+def test_no_motion_begins_during_a_quick_stop_that_the_drive_does_not_show_yet() -> None:
+    bench = Bench(0, Mode.CST)
+    bench.play(TORQUE, [100] * 500)
+    bench.step(50)
+    bench.axis.stop(RELEASED)
+    bench.axis.drive_to(State.OPERATION_ENABLED, None)
+    bench.step()
+    with pytest.raises(NotAllowed, match="brak"):
+        bench.play(TORQUE, [100] * 500)
+
+
+def test_a_change_to_csp_of_an_enabled_axis_does_not_pull_it_back() -> None:
+    """Enabled without torque it was turned by hand; the target was still where it was enabled."""
+    bench = Bench(0, Mode.CST)
+    for _ in range(100):
+        bench.position += 1000
+        bench.step()
+    assert bench.axis.state is State.OPERATION_ENABLED
+    bench.axis.drive_to(State.OPERATION_ENABLED, Mode.CSP)
+    bench.step()
+    assert bench.out(POSITION) == bench.position
+    bench.mode = Mode.CSP
+    bench.step()
+    bench.position += 7
+    bench.step()
+    assert bench.out(POSITION) == bench.position - 7, "from now on it is held there"
