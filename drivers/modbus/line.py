@@ -347,9 +347,10 @@ class Line:
         same_read_again = query.frame[1] == READ and query.frame == self._last_failed
         if late.pending(self._clock()) and not same_read_again:
             self._outwait(port, late, query, timeout_s)
-        if self.echo is None and query.frame[1] != READ:
+        check = late.check(query) if self.echo is None and query.frame[1] != READ else None
+        if check is not None:
             with suppress(Rejected):
-                self._exchange(port, late, late.check(query), timeout_s)
+                self._exchange(port, late, check, timeout_s)
 
     def _settle(self, port: Port) -> None:
         """Discard stray bytes; if there were any, wait until the line is silent."""
@@ -376,6 +377,8 @@ class Line:
         """
         for choose in (late.check, late.second_check):
             check = choose(query)
+            if check is None:
+                break
             self._count(query.station).late_checks += 1
             try:
                 self._exchange(port, late, check, timeout_s)
