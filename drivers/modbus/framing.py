@@ -41,6 +41,8 @@ EXCEPTION_TEXTS: dict[int, str] = {
 
 #: The drive was busy and did nothing: repeat the request later (V1.1b3 clause 7).
 BUSY = 6
+#: A gateway reports that the drive behind it was not reached (V1.1b3 clause 7).
+NOT_REACHED = (10, 11)
 #: Remedy for each exception code.
 EXCEPTION_REMEDIES: dict[int, str] = {
     1: "this drive or firmware may speak another dialect: check that the profile fits the drive",
