@@ -105,18 +105,20 @@ class DriveSetup:
 
     def _map(self, pdo: PdoPlan) -> None:
         station = pdo.station
-        cleared = False
+        changed: set[int] = set()
         try:
             cob = self._read(station, pdo.communication, 1)
+            writes = set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS)
             self._remember(pdo, cob)
-            for write in set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS):
+            # The identifier cannot be changed while the PDO is valid (CiA 301 clause 7.5.2.35).
+            for write in [_closed(pdo, cob), *writes]:
                 self._write(station, write.index, write.subindex, write.data)
-                cleared = cleared or write.index == pdo.mapping
+                changed.add(write.index)
+            self._undo.append((station, writes[0]))  # before its identifier is changed back
         except Rejected as refusal:
-            if not cleared:  # a fixed mapping is unchanged, and would refuse to be restored
-                self._undo = [
-                    (s, w) for s, w in self._undo if (s, w.index) != (station, pdo.mapping)
-                ]
+            # What is fixed is unchanged, and would refuse to be restored.
+            unchanged = {pdo.communication, pdo.mapping} - changed
+            self._undo = [(s, w) for s, w in self._undo if s != station or w.index not in unchanged]
             names = ", ".join(str(s.address) for s in pdo.signals)
             raise NotAllowed(
                 "canopen.node-not-let-mapped",
@@ -196,14 +198,13 @@ class DriveSetup:
         kind = fitted(self._read(station, pdo.communication, 2), 1)
         count = fitted(self._read(station, pdo.mapping, 0), 1)
         entries = [self._read(station, pdo.mapping, n) for n in range(1, min(count[0], 8) + 1)]
-        invalid = int.from_bytes(cob, "little") | INVALID
         before = [
             SdoWrite(pdo.communication, 1, cob),
             SdoWrite(pdo.mapping, 0, count),
             *[SdoWrite(pdo.mapping, n, e) for n, e in enumerate(entries, 1)][::-1],
             SdoWrite(pdo.mapping, 0, b"\0"),
             SdoWrite(pdo.communication, 2, kind),
-            SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little")),
+            _closed(pdo, cob),
         ]
         self._undo += [(station, write) for write in before]
 
@@ -224,3 +225,9 @@ class DriveSetup:
                 failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
         if failures:
             raise NotAllowed("canopen.settings-drives-not-put", failures="; ".join(failures))
+
+
+def _closed(pdo: PdoPlan, cob: bytes) -> SdoWrite:
+    """Return the write that makes a PDO invalid and keeps its identifier."""
+    invalid = int.from_bytes(cob, "little") | INVALID
+    return SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little"))

@@ -7,12 +7,14 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.drive_setup import DriveSetup
 from drivers.canopen.frames import Frame
 from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
-from drivers.errors import Rejected
+from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, CyclicSignal
 
 SPEED = CyclicSignal(5, Address(0x60FF, 0, "INT32"), "speed")
@@ -110,3 +112,60 @@ async def test_the_exchange_starts_from_values_that_come_with_four_bytes() -> No
     finally:
         await cyclic.stop()
     assert node.objects[0x1400, 2] == b"\xff"
+
+
+class StrictNode(Node):
+    """Refuses another identifier while the PDO is valid (CiA 301 clause 7.5.2.35, bits 0 to 29)."""
+
+    def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+        if 0x1400 <= index < 0x1C00 and not index & 0x200 and subindex == 1:
+            before, after = (struct.unpack("<I", d)[0] for d in (self.objects[index, 1], data))
+            if not before & 0x80000000 and (before ^ after) & 0x3FFFFFFF:
+                raise Rejected("not while it is valid", abort_code=0x06090030)
+        super().write(station, index, subindex, data)
+
+
+def other_identifier() -> dict[tuple[int, int], bytes]:
+    return {
+        (0x1400, 1): struct.pack("<I", 0x40000321),
+        (0x1400, 2): b"\xff",
+        (0x1600, 0): b"\x01",
+        (0x1600, 1): struct.pack("<I", 0x60400010),
+    }
+
+
+def test_an_identifier_is_changed_while_its_pdo_is_not_valid() -> None:
+    node = StrictNode(other_identifier())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    assert node.objects[0x1400, 1] == struct.pack("<I", 0x40000205)
+    setup.undo()
+    assert node.objects == other_identifier()
+
+
+def test_an_identifier_that_cannot_be_changed_is_the_reason_that_is_given() -> None:
+    """The put-back of what never changed was refused as well, and hid the reason."""
+    node = Node(other_identifier(), frozenset({(0x1400, 1)}))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    with pytest.raises(NotAllowed, match="does not accept 60FF:00 in the mapping of PDO 1"):
+        setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.undo()
+    assert node.objects == other_identifier()
+
+
+def test_an_identifier_that_is_fixed_but_for_its_valid_bit() -> None:
+    class Fixed(Node):
+        def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+            before = struct.unpack("<I", self.objects[0x1400, 1])[0]
+            if (index, subindex) == (0x1400, 1) and (
+                (before ^ struct.unpack("<I", data)[0]) & 0x3FFFFFFF
+            ):
+                raise Rejected("fixed", abort_code=0x06090030)
+            super().write(station, index, subindex, data)
+
+    node = Fixed(other_identifier())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    with pytest.raises(NotAllowed, match="in the mapping of PDO 1: fixed"):
+        setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.undo()
+    assert node.objects == other_identifier()
