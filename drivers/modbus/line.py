@@ -20,10 +20,9 @@ from drivers.flight.kinds import serial_ring
 from drivers.flight.serial import RecordedPort
 from drivers.link import LinkQuality
 from drivers.modbus.framing import (
-    EXCEPTION_REMEDIES,
     EXCEPTION_TEXTS,
     READ,
-    UNKNOWN_EXCEPTION_REMEDY,
+    UNKNOWN_EXCEPTION,
     Answer,
     Query,
     find_answer,
@@ -252,13 +251,13 @@ class Line:
         code = answer.exception
         if code is not None:
             counters.refusals += 1
-            text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
+            why = EXCEPTION_TEXTS.get(code, UNKNOWN_EXCEPTION)
             raise Rejected(
                 "modbus.station-exception",
                 abort_code=code,
-                remedy=EXCEPTION_REMEDIES.get(code, UNKNOWN_EXCEPTION_REMEDY),
+                remedy=why.remedy(),
                 station=query.station,
-                text=text,
+                text=why,
                 number=code,
             )
         late.answered(query)
@@ -317,7 +316,7 @@ class Line:
                 "modbus.station-sent-damaged-answer", station=query.station, shown=shown
             )
         counters.timeouts += 1
-        only_echo = " (only the adapter's echo of the question came back)" if self.echo else ""
+        only_echo = text("modbus.only-echo") if self.echo else ""
         raise LinkTimeout(
             "modbus.station-not-answer-within",
             station=query.station,

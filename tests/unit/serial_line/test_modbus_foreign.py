@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
 
 from drivers.errors import DriveError, LinkTimeout, Rejected
 from drivers.link import Address
-from drivers.modbus.framing import exception_response, read_response
+from drivers.modbus.framing import EXCEPTION_TEXTS, exception_response, read_response
 from drivers.modbus.layout import TableLayout
 from drivers.modbus.line import Line
 from drivers.modbus.link import RegisterLink
@@ -110,3 +111,25 @@ async def test_a_refused_register_still_splits_its_block() -> None:
         assert [isinstance(each, DriveError) for each in got] == [n == 3 for n in range(8)]
     finally:
         await link.close()
+
+
+@pytest.mark.parametrize("code", [*EXCEPTION_TEXTS, 0x55])
+def test_a_refusal_is_in_the_readers_language(code: int) -> None:
+    port = Port(lambda request: exception_response(request[0], request[1], code))
+    line = port.line(LineSettings("/dev/ttyS0"))
+    line.open()
+    with pytest.raises(Rejected) as refused:
+        line.read(1, 0, 1)
+    assert not re.search("[a-z]{5}", refused.value.text.words("zh").replace("Modbus", ""))
+    assert refused.value.remedy_text is not None
+    assert not re.search("[a-z]{3}", refused.value.remedy_text.words("zh"))
+    assert refused.value.message.startswith("station 1: the ")
+
+
+def test_an_echo_alone_is_said_in_the_readers_language() -> None:
+    port = Port(lambda request: request)
+    line = port.line(LineSettings("/dev/ttyS0"))
+    line.open()
+    with pytest.raises(LinkTimeout, match=r"ms \(only the adapter's echo") as silent:
+        line.read(1, 0, 1)
+    assert not re.search("[a-z]{3}", silent.value.text.words("zh"))
