@@ -425,6 +425,7 @@ class CanopenCyclic:
         if images.outputs:
             self._require_own_number()
         self._nmt(frames.NMT_PREOPERATIONAL, images.stations)
+        self._setup.undo()  # what an exchange left that ended with the loss of the adapter
         self._setup.map_pdos(configured.pdos)
         unguarded = set()
         for station in sorted({station for station, _, _ in images.outputs}):

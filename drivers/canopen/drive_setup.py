@@ -68,22 +68,19 @@ class DriveSetup:
             # No interpolation, or not over this time: the drive keeps its own. The new value with
             # the old exponent would be another time.
             self._put_back(self._undo[begin:])
-            del self._undo[begin:]
 
     def unguard(self) -> None:
         """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
-        mine = [(s, w) for s, w in self._undo if w.index == 0x1016]
-        self._undo = [(s, w) for s, w in self._undo if w.index != 0x1016]
-        self._put_back(mine)
+        self._put_back([each for each in self._undo if each[1].index == 0x1016])
 
     def undo(self) -> None:
         """Restore all settings.
 
         Raises:
             NotAllowed: something could not be restored; the message lists it.
+            LinkLost: the bus is gone; what is left is restored by the next call.
         """
-        undo, self._undo = self._undo, []
-        self._put_back(undo)
+        self._put_back(list(self._undo))
 
     def _change(self, station: int, write: SdoWrite) -> None:
         before = fitted(self._read(station, write.index, write.subindex), len(write.data))
@@ -211,20 +208,27 @@ class DriveSetup:
     def _put_back(self, undo: Sequence[tuple[int, SdoWrite]]) -> None:
         failures: list[str] = []
         silent: set[int] = set()
-        for station, write in reversed(undo):
-            if station in silent:
-                continue  # repeated requests to a drive that does not answer only take time
-            try:
-                self._write(station, write.index, write.subindex, write.data)
-            except LinkLost:
-                raise
-            except LinkTimeout as error:
-                silent.add(station)
-                failures.append(f"all of node {station}, which does not answer ({error})")
-            except DriveError as error:
-                failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
+        for each in reversed(undo):
+            station, write = each
+            if station not in silent:  # requests to a drive that does not answer only take time
+                self._put_back_one(station, write, failures, silent)
+            self._undo = [other for other in self._undo if other is not each]
         if failures:
             raise NotAllowed("canopen.settings-drives-not-put", failures="; ".join(failures))
+
+    def _put_back_one(
+        self, station: int, write: SdoWrite, failures: list[str], silent: set[int]
+    ) -> None:
+        """Write one setting; add a failure, and a station that does not answer."""
+        try:
+            self._write(station, write.index, write.subindex, write.data)
+        except LinkLost:
+            raise
+        except LinkTimeout as error:
+            silent.add(station)
+            failures.append(f"all of node {station}, which does not answer ({error})")
+        except DriveError as error:
+            failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
 
 
 def _closed(pdo: PdoPlan, cob: bytes) -> SdoWrite:

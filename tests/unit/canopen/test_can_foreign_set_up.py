@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ from drivers.canopen.drive_setup import DriveSetup
 from drivers.canopen.frames import Frame
 from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
-from drivers.errors import NotAllowed, Rejected
+from drivers.errors import LinkLost, NotAllowed, Rejected
 from drivers.link import Address, CyclicSignal
 
 SPEED = CyclicSignal(5, Address(0x60FF, 0, "INT32"), "speed")
@@ -169,3 +170,62 @@ def test_an_identifier_that_is_fixed_but_for_its_valid_bit() -> None:
         setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
     setup.undo()
     assert node.objects == other_identifier()
+
+
+class Unplugged(Node):
+    """Loses the bus after ``writes`` writes, until ``plugged``."""
+
+    writes = 1000
+
+    def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+        if self.writes == 0:
+            raise LinkLost("canopen.bus-lost")
+        self.writes -= 1
+        super().write(station, index, subindex, data)
+
+
+def before_the_loss() -> dict[tuple[int, int], bytes]:
+    return other_identifier() | {
+        (0x1016, 1): bytes(4),
+        (0x60C2, 1): b"\x02",
+        (0x60C2, 2): b"\xfd",
+    }
+
+
+@pytest.mark.parametrize("left", range(9))
+def test_what_a_lost_adapter_left_changed_is_restored_when_it_is_back(left: int) -> None:
+    """It was forgotten, and the values of the exchange counted as the drive's own from then on."""
+    node = Unplugged(before_the_loss())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.interpolate(5, 0.004)
+    assert setup.guard(5)
+    assert node.objects != before_the_loss()
+    node.writes = left
+    for undo in (setup.unguard, setup.undo):
+        with contextlib.suppress(LinkLost):
+            undo()
+    node.writes = 1000
+    setup.undo()
+    assert node.objects == before_the_loss()
+
+
+async def test_the_next_exchange_begins_with_what_is_still_to_be_restored() -> None:
+    node = Unplugged(before_the_loss() | {(0x6040, 0): b"\x06\0"})
+    port: Any = SimpleNamespace(send=lambda _frame: None)
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    url = parse_canopen_url("canopen://virtual/can0")
+    cyclic = CanopenCyclic(port, url, node.read, node.write, at_once)
+    control = CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")
+    await cyclic.configure([], [control], 0.01)
+    await cyclic.start()
+    node.writes = 0
+    with pytest.raises(LinkLost):
+        await cyclic.stop()
+    node.writes = 1000
+    await cyclic.start()
+    await cyclic.stop()
+    assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()
