@@ -9,6 +9,7 @@ from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
 from drivers.canopen.sdo import fitted
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.motion.interpolation import interpolation_period
+from drivers.texts.message import Text, joined, text
 
 WATCHDOG_MS = 200
 _PDO_FLAGS = 0x60000000
@@ -206,7 +207,7 @@ class DriveSetup:
         self._undo += [(station, write) for write in before]
 
     def _put_back(self, undo: Sequence[tuple[int, SdoWrite]]) -> None:
-        failures: list[str] = []
+        failures: list[Text] = []
         silent: set[int] = set()
         for each in reversed(undo):
             station, write = each
@@ -214,10 +215,10 @@ class DriveSetup:
                 self._put_back_one(station, write, failures, silent)
             self._undo = [other for other in self._undo if other is not each]
         if failures:
-            raise NotAllowed("canopen.settings-drives-not-put", failures="; ".join(failures))
+            raise NotAllowed("canopen.settings-drives-not-put", failures=joined(failures))
 
     def _put_back_one(
-        self, station: int, write: SdoWrite, failures: list[str], silent: set[int]
+        self, station: int, write: SdoWrite, failures: list[Text], silent: set[int]
     ) -> None:
         """Write one setting; add a failure, and a station that does not answer."""
         try:
@@ -226,9 +227,10 @@ class DriveSetup:
             raise
         except LinkTimeout as error:
             silent.add(station)
-            failures.append(f"all of node {station}, which does not answer ({error})")
+            failures.append(text("canopen.not-put-silent", node=station, cause=error.text))
         except DriveError as error:
-            failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
+            key = f"{write.index:04X}:{write.subindex:02X}"
+            failures.append(text("canopen.not-put", node=station, key=key, cause=error.text))
 
 
 def _closed(pdo: PdoPlan, cob: bytes) -> SdoWrite:

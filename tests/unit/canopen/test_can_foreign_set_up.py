@@ -229,3 +229,13 @@ async def test_the_next_exchange_begins_with_what_is_still_to_be_restored() -> N
     await cyclic.start()
     await cyclic.stop()
     assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()
+
+
+def test_what_could_not_be_restored_is_said_in_the_readers_language() -> None:
+    node = Node(before_the_loss())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    assert setup.guard(5)
+    node._read_only = frozenset({(0x1016, 1)})
+    with pytest.raises(NotAllowed, match=r"restored: node 5 1016:01 \(the object") as refused:
+        setup.undo()
+    assert "节点 5 的 1016:01" in refused.value.text.words("zh")
