@@ -12,7 +12,7 @@ import pytest
 
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.drive_setup import DriveSetup
-from drivers.canopen.frames import Frame
+from drivers.canopen.frames import NMT_START, Frame
 from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, Rejected
@@ -239,3 +239,23 @@ def test_what_could_not_be_restored_is_said_in_the_readers_language() -> None:
     with pytest.raises(NotAllowed, match=r"restored: node 5 1016:01 \(the object") as refused:
         setup.undo()
     assert "节点 5 的 1016:01" in refused.value.text.words("zh")
+
+
+async def test_a_start_that_fails_at_its_last_step_leaves_nothing_running() -> None:
+    node = Node(before_the_loss() | {(0x6040, 0): b"\x06\0"})
+
+    def send(frame: Frame) -> None:
+        if frame.cob_id == 0 and frame.data[0] == NMT_START:
+            raise LinkLost("canopen.bus-lost")
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    port: Any = SimpleNamespace(send=send)
+    url = parse_canopen_url("canopen://virtual/can0")
+    cyclic = CanopenCyclic(port, url, node.read, node.write, at_once)
+    await cyclic.configure([], [CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")], 0.01)
+    with pytest.raises(LinkLost):
+        await cyclic.start()
+    assert not cyclic.running
+    assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()
