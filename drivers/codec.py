@@ -71,6 +71,11 @@ def _octets(raw: Raw) -> bytes:
         ) from error
 
 
+def serial_or_none(number: int | None) -> int | None:
+    """Return a serial number (1018h:04); None for 0 and FFFFFFFFh, which was never written."""
+    return None if number in (None, 0, 0xFFFFFFFF) else number
+
+
 def text_of(data: bytes) -> str:
     """Decode a drive's text, which ends at the first zero byte or with the data."""
     text = data.split(b"\0", 1)[0]

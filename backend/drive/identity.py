@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from backend.drive.drive import Drive
+from drivers.codec import serial_or_none
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
 from drivers.texts.message import text
@@ -22,7 +23,7 @@ async def read_serial(drive: Drive) -> int | None:
                 data = await port.link.read(port.station, Address(0x1018, 4, "UINT32"))
         except (Rejected, NotAllowed):
             continue
-        return int.from_bytes(data, "little") or None
+        return serial_or_none(int.from_bytes(data, "little"))
     return None
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -199,7 +200,12 @@ class CanopenCyclic:
             clock=self._clock,
         )
         self._loop.start()
-        await self._in_worker(partial(self._nmt, frames.NMT_START, images.stations))
+        try:
+            await self._in_worker(partial(self._nmt, frames.NMT_START, images.stations))
+        except BaseException:
+            with suppress(DriveError):
+                await asyncio.shield(self.stop())
+            raise
 
     async def stop(self) -> None:
         """Ramp down every moving axis, leave Operational and restore the drives' PDOs."""
@@ -425,6 +431,7 @@ class CanopenCyclic:
         if images.outputs:
             self._require_own_number()
         self._nmt(frames.NMT_PREOPERATIONAL, images.stations)
+        self._setup.undo()  # what an exchange left that ended with the loss of the adapter
         self._setup.map_pdos(configured.pdos)
         unguarded = set()
         for station in sorted({station for station, _, _ in images.outputs}):

@@ -9,6 +9,7 @@ from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
 from drivers.canopen.sdo import fitted
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.motion.interpolation import interpolation_period
+from drivers.texts.message import Text, joined, text
 
 WATCHDOG_MS = 200
 _PDO_FLAGS = 0x60000000
@@ -68,22 +69,19 @@ class DriveSetup:
             # No interpolation, or not over this time: the drive keeps its own. The new value with
             # the old exponent would be another time.
             self._put_back(self._undo[begin:])
-            del self._undo[begin:]
 
     def unguard(self) -> None:
         """Undo `guard`: before the heartbeat ends, or the drives would report a fault."""
-        mine = [(s, w) for s, w in self._undo if w.index == 0x1016]
-        self._undo = [(s, w) for s, w in self._undo if w.index != 0x1016]
-        self._put_back(mine)
+        self._put_back([each for each in self._undo if each[1].index == 0x1016])
 
     def undo(self) -> None:
         """Restore all settings.
 
         Raises:
             NotAllowed: something could not be restored; the message lists it.
+            LinkLost: the bus is gone; what is left is restored by the next call.
         """
-        undo, self._undo = self._undo, []
-        self._put_back(undo)
+        self._put_back(list(self._undo))
 
     def _change(self, station: int, write: SdoWrite) -> None:
         before = fitted(self._read(station, write.index, write.subindex), len(write.data))
@@ -105,18 +103,20 @@ class DriveSetup:
 
     def _map(self, pdo: PdoPlan) -> None:
         station = pdo.station
-        cleared = False
+        changed: set[int] = set()
         try:
             cob = self._read(station, pdo.communication, 1)
+            writes = set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS)
             self._remember(pdo, cob)
-            for write in set_up(pdo, int.from_bytes(cob, "little") & _PDO_FLAGS):
+            # The identifier cannot be changed while the PDO is valid (CiA 301 clause 7.5.2.35).
+            for write in [_closed(pdo, cob), *writes]:
                 self._write(station, write.index, write.subindex, write.data)
-                cleared = cleared or write.index == pdo.mapping
+                changed.add(write.index)
+            self._undo.append((station, writes[0]))  # before its identifier is changed back
         except Rejected as refusal:
-            if not cleared:  # a fixed mapping is unchanged, and would refuse to be restored
-                self._undo = [
-                    (s, w) for s, w in self._undo if (s, w.index) != (station, pdo.mapping)
-                ]
+            # What is fixed is unchanged, and would refuse to be restored.
+            unchanged = {pdo.communication, pdo.mapping} - changed
+            self._undo = [(s, w) for s, w in self._undo if s != station or w.index not in unchanged]
             names = ", ".join(str(s.address) for s in pdo.signals)
             raise NotAllowed(
                 "canopen.node-not-let-mapped",
@@ -196,31 +196,44 @@ class DriveSetup:
         kind = fitted(self._read(station, pdo.communication, 2), 1)
         count = fitted(self._read(station, pdo.mapping, 0), 1)
         entries = [self._read(station, pdo.mapping, n) for n in range(1, min(count[0], 8) + 1)]
-        invalid = int.from_bytes(cob, "little") | INVALID
         before = [
             SdoWrite(pdo.communication, 1, cob),
             SdoWrite(pdo.mapping, 0, count),
             *[SdoWrite(pdo.mapping, n, e) for n, e in enumerate(entries, 1)][::-1],
             SdoWrite(pdo.mapping, 0, b"\0"),
             SdoWrite(pdo.communication, 2, kind),
-            SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little")),
+            _closed(pdo, cob),
         ]
         self._undo += [(station, write) for write in before]
 
     def _put_back(self, undo: Sequence[tuple[int, SdoWrite]]) -> None:
-        failures: list[str] = []
+        failures: list[Text] = []
         silent: set[int] = set()
-        for station, write in reversed(undo):
-            if station in silent:
-                continue  # repeated requests to a drive that does not answer only take time
-            try:
-                self._write(station, write.index, write.subindex, write.data)
-            except LinkLost:
-                raise
-            except LinkTimeout as error:
-                silent.add(station)
-                failures.append(f"all of node {station}, which does not answer ({error})")
-            except DriveError as error:
-                failures.append(f"node {station} {write.index:04X}:{write.subindex:02X} ({error})")
+        for each in reversed(undo):
+            station, write = each
+            if station not in silent:  # requests to a drive that does not answer only take time
+                self._put_back_one(station, write, failures, silent)
+            self._undo = [other for other in self._undo if other is not each]
         if failures:
-            raise NotAllowed("canopen.settings-drives-not-put", failures="; ".join(failures))
+            raise NotAllowed("canopen.settings-drives-not-put", failures=joined(failures))
+
+    def _put_back_one(
+        self, station: int, write: SdoWrite, failures: list[Text], silent: set[int]
+    ) -> None:
+        """Write one setting; add a failure, and a station that does not answer."""
+        try:
+            self._write(station, write.index, write.subindex, write.data)
+        except LinkLost:
+            raise
+        except LinkTimeout as error:
+            silent.add(station)
+            failures.append(text("canopen.not-put-silent", node=station, cause=error.text))
+        except DriveError as error:
+            key = f"{write.index:04X}:{write.subindex:02X}"
+            failures.append(text("canopen.not-put", node=station, key=key, cause=error.text))
+
+
+def _closed(pdo: PdoPlan, cob: bytes) -> SdoWrite:
+    """Return the write that makes a PDO invalid and keeps its identifier."""
+    invalid = int.from_bytes(cob, "little") | INVALID
+    return SdoWrite(pdo.communication, 1, invalid.to_bytes(4, "little"))

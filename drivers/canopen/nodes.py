@@ -41,12 +41,13 @@ _EMERGENCY_CLASSES = {
     0xFF: text("emergency.makers"),
 }
 
+_COLLISION = 0x8150
 _EMERGENCIES = {
     0x8110: text("emergency.can-overrun"),
     0x8120: text("emergency.error-passive"),
     0x8130: text("emergency.life-guard"),
     0x8140: text("emergency.recovered-from-bus-off"),
-    0x8150: text("emergency.same-identifier"),
+    _COLLISION: text("emergency.same-identifier"),
     0x8210: text("emergency.pdo-too-short"),
     0x8220: text("emergency.pdo-too-long"),
     0x8240: text("emergency.sync-length"),
@@ -197,6 +198,7 @@ class NodeWatch:
         record.boots += 1
         record.boots_s = [*record.boots_s, now_s][-_BOOTS_KEPT:]
         record.open_emergency = None
+        self._withdraw_collision(record)
         record.intervals_s.clear()
         record.guard_toggle = record.guard_asked_s = None
         record.guarded = False
@@ -225,8 +227,10 @@ class NodeWatch:
         record.last_emergency = code
         record.open_emergency = code or None
         meaning = emergency_text(code)
-        if code == 0x8150:
+        if code == _COLLISION:
             record.conflict = meaning
+        elif code == 0:
+            self._withdraw_collision(record)
         if record.emergencies_reported >= _EMERGENCIES_PER_S:
             record.emergencies_untold += 1
             return events
@@ -242,6 +246,11 @@ class NodeWatch:
         else:
             message = text("event.node-emergency", **facts)
         return [*events, LinkEvent("emergency", record.node, message, code)]
+
+    def _withdraw_collision(self, record: NodeRecord) -> None:
+        """End what emergency 8150h reported; conflicts of node numbers end otherwise."""
+        if record.conflict == _EMERGENCIES[_COLLISION]:
+            record.conflict = None
 
     def _end_of_storm(self, record: NodeRecord, now_s: float) -> list[LinkEvent]:
         """Return the count of suppressed emergencies; reporting starts again every second."""

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 
 from drivers.canopen.channel import SdoChannel
-from drivers.codec import text_of
+from drivers.codec import serial_or_none, text_of
 from drivers.errors import DriveError, LinkLost
 from drivers.link import Found
 from drivers.texts.message import Text, text
@@ -53,11 +53,11 @@ def identify(channel: SdoChannel, answers: Sequence[bytes], timeout_s: float) ->
 
     return Found(
         station=channel.node,
-        # 0 is neither a vendor nor a serial number: the drive has none.
+        # Vendor 0 does not exist: the drive states none.
         vendor_id=number(0x1018, 1) or None,
         product_code=number(0x1018, 2),
         revision=number(0x1018, 3),
-        serial=number(0x1018, 4) or None,
+        serial=serial_or_none(number(0x1018, 4)),
         name=shown(0x1008),
         hardware=shown(0x1009),
         firmware=shown(0x100A),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from drivers.codec import serial_or_none
 from drivers.errors import NotAllowed
 from drivers.link import Address, Found
 from drivers.modbus.layout import BlockLimits
@@ -117,7 +118,7 @@ class MlinkLayout:
             vendor_id=vendor,
             product_code=product,
             revision=revision,
-            serial=serial,
+            serial=serial_or_none(serial),
             state=None if status is None else text("mlink.state", status=f"{status:#06x}"),
             notes=tuple(notes),
         )

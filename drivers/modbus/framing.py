@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from drivers.errors import OutOfRange
+from drivers.texts.message import Text, text
 
 READ = 0x03
 READ_INPUT = 0x04
@@ -27,34 +28,23 @@ MAX_WRITE_REGISTERS = 123
 MAX_FRAME_BYTES = 256
 
 #: Meaning of exception codes. 1 to 11: V1.1b3 clause 7; 2 to 4 also in manual 003:1160-1162.
-EXCEPTION_TEXTS: dict[int, str] = {
-    1: "the drive does not know this function code",
-    2: "the drive has no such register (illegal address)",
-    3: "the drive does not accept this value or length (illegal data)",
-    4: "the drive refused to execute the request",
-    5: "the drive accepted the request and is still working on it",
-    6: "the drive is busy",
-    8: "the drive found its memory damaged",
-    10: "the gateway has no path to the drive",
-    11: "the drive behind the gateway does not answer",
+EXCEPTION_TEXTS: dict[int, Text] = {
+    1: text("modbus.exception-1"),
+    2: text("modbus.exception-2"),
+    3: text("modbus.exception-3"),
+    4: text("modbus.exception-4"),
+    5: text("modbus.exception-5"),
+    6: text("modbus.exception-6"),
+    8: text("modbus.exception-8"),
+    10: text("modbus.exception-10"),
+    11: text("modbus.exception-11"),
 }
+UNKNOWN_EXCEPTION = text("modbus.exception-unknown")
 
 #: The drive was busy and did nothing: repeat the request later (V1.1b3 clause 7).
 BUSY = 6
-#: Remedy for each exception code.
-EXCEPTION_REMEDIES: dict[int, str] = {
-    1: "this drive or firmware may speak another dialect: check that the profile fits the drive",
-    2: "this model or firmware may not have it: compare with the drive's manual",
-    3: "choose one of the values in the help text",
-    4: "disable the drive or leave its own panel, check that the parameter is not write-protected, "
-    "and try again",
-    5: "wait, then read the value back before writing again",
-    6: "nothing was done: wait a moment and try again",
-    8: "switch the drive off and on; if it comes back, the drive needs service",
-    10: "check how the gateway is set up",
-    11: "check the drive's supply and wiring behind the gateway",
-}
-UNKNOWN_EXCEPTION_REMEDY = "look the code up in the drive's manual"
+#: A gateway reports that the drive behind it was not reached (V1.1b3 clause 7).
+NOT_REACHED = (10, 11)
 
 
 def _crc_table() -> tuple[int, ...]:

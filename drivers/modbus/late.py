@@ -53,21 +53,24 @@ class LateAnswers:
             del self._outstanding[head]
         return bool(self._outstanding)
 
-    def check(self, near: Query) -> Query:
-        """Return a read whose answer differs from all that may come, if possible a proven one."""
+    def check(self, near: Query) -> Query | None:
+        """Return a read whose answer differs from all that may come, if possible a proven one.
+
+        None if answers of every length may come, as many requests had none within a short time.
+        """
         for head, query in self._good.items():
             if head not in self._outstanding:
                 return query
         return self._unlike(near, READ)
 
-    def second_check(self, near: Query) -> Query:
+    def second_check(self, near: Query) -> Query | None:
         """Return a read whose refusal differs, too: many drives do not know function 04."""
         return self._unlike(near, READ_INPUT)
 
-    def _unlike(self, near: Query, function: int) -> Query:
+    def _unlike(self, near: Query, function: int) -> Query | None:
         start = min(int.from_bytes(near.frame[2:4], "big"), 0xFF00)
         shapes = (read_query(near.station, start, count, function) for count in range(1, 126))
-        return next(query for query in shapes if query.head not in self._outstanding)
+        return next((query for query in shapes if query.head not in self._outstanding), None)
 
     def refusal_proves(self, check: Query) -> bool:
         """Return whether this refusal can only be that of ``check``."""

@@ -20,10 +20,9 @@ from drivers.flight.kinds import serial_ring
 from drivers.flight.serial import RecordedPort
 from drivers.link import LinkQuality
 from drivers.modbus.framing import (
-    EXCEPTION_REMEDIES,
     EXCEPTION_TEXTS,
     READ,
-    UNKNOWN_EXCEPTION_REMEDY,
+    UNKNOWN_EXCEPTION,
     Answer,
     Query,
     find_answer,
@@ -265,13 +264,13 @@ class Line:
         code = answer.exception
         if code is not None:
             counters.refusals += 1
-            text = EXCEPTION_TEXTS.get(code, "the drive refused for a reason Modbus does not name")
+            why = EXCEPTION_TEXTS.get(code, UNKNOWN_EXCEPTION)
             raise Rejected(
                 "modbus.station-exception",
                 abort_code=code,
-                remedy=EXCEPTION_REMEDIES.get(code, UNKNOWN_EXCEPTION_REMEDY),
+                remedy=why.remedy(),
                 station=query.station,
-                text=text,
+                text=why,
                 number=code,
             )
         late.answered(query)
@@ -330,7 +329,7 @@ class Line:
                 "modbus.station-sent-damaged-answer", station=query.station, shown=shown
             )
         counters.timeouts += 1
-        only_echo = " (only the adapter's echo of the question came back)" if self.echo else ""
+        only_echo = text("modbus.only-echo") if self.echo else ""
         raise LinkTimeout(
             "modbus.station-not-answer-within",
             station=query.station,
@@ -360,9 +359,10 @@ class Line:
         same_read_again = query.frame[1] == READ and query.frame == self._last_failed
         if late.pending(self._clock()) and not same_read_again:
             self._outwait(port, late, query, timeout_s)
-        if self.echo is None and query.frame[1] != READ:
+        check = late.check(query) if self.echo is None and query.frame[1] != READ else None
+        if check is not None:
             with suppress(Rejected):
-                self._exchange(port, late, late.check(query), timeout_s)
+                self._exchange(port, late, check, timeout_s)
 
     def _settle(self, port: Port) -> None:
         """Discard stray bytes; if there were any, wait until the line is silent."""
@@ -389,6 +389,8 @@ class Line:
         """
         for choose in (late.check, late.second_check):
             check = choose(query)
+            if check is None:
+                break
             self._count(query.station).late_checks += 1
             try:
                 self._exchange(port, late, check, timeout_s)

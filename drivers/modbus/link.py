@@ -35,7 +35,7 @@ from drivers.link import (
     Unsubscribe,
     lists_nothing,
 )
-from drivers.modbus.framing import BUSY
+from drivers.modbus.framing import BUSY, NOT_REACHED
 from drivers.modbus.layout import Layout, TableLayout
 from drivers.modbus.line import Line
 from drivers.modbus.port import LineSettings
@@ -291,7 +291,9 @@ class RegisterLink:
             batch.wait_s = _BUSY_S * 2**attempt
             batch.todo.appendleft((block, attempt + 1))
             return
-        if isinstance(error, Rejected) and not busy and len(block.items) > 1:
+        unreached = isinstance(error, Rejected) and error.abort_code in NOT_REACHED
+        refused = isinstance(error, Rejected) and not busy and not unreached
+        if refused and len(block.items) > 1:
             # One of its registers is refused: read them one by one, now and later.
             self._refused_blocks.add((station, block.start, block.count))
             self._plans.clear()
@@ -307,7 +309,7 @@ class RegisterLink:
             return
         for item in block.items:
             batch.results[item] = _again(error)
-        batch.silent_blocks = batch.silent_blocks + 1 if mute else 0
+        batch.silent_blocks = batch.silent_blocks + 1 if mute or unreached else 0
         if isinstance(error, LinkLost) or batch.silent_blocks >= 2:
             for rest, _ in batch.todo:
                 for item in rest.items:

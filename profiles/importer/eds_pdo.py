@@ -11,6 +11,8 @@ from profiles.importer.values import node_relative, parse_number
 from profiles.schema import DataType, PdoIdentifier
 
 _IDENTIFIER = 0x7FF
+#: The frame has an identifier of 29 bits; also set in FFFFFFFFh, which templates contain.
+_EXTENDED = 1 << 29
 #: Bits of a whole object by its type; a boolean takes one byte as a value of its own.
 _BITS: dict[DataType, int] = {
     "BOOL": 8, "INT8": 8, "UINT8": 8, "INT16": 16, "UINT16": 16, "INT32": 32, "UINT32": 32,
@@ -104,7 +106,7 @@ def _identifier(
     place = f"{name} [{communication:04X}sub1]"
     added = node_relative(text, place, report)
     number = added if added is not None else parse_number(text, place, report)
-    if not isinstance(number, int) or not number & _IDENTIFIER:
+    if not isinstance(number, int) or not number & _IDENTIFIER or number & _EXTENDED:
         return None
     entry = by_key.get(f"{communication:04X}:01")
     return PdoIdentifier(

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.codec import text_of
+from drivers.codec import serial_or_none, text_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat.wire import coe, esc, sii
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
@@ -236,7 +236,7 @@ def identify(station: Station, clock: Callable[[], float]) -> Steps[None]:
         yield from to_preop(station, clock)
         reported = yield from _try_read(station, 0x1018, 4)
         if reported is not None and len(reported) == 4:
-            station.serial = int.from_bytes(reported, "little") or station.serial
+            station.serial = serial_or_none(int.from_bytes(reported, "little")) or station.serial
         device_type = yield from _try_read(station, 0x1000, 0)
         if device_type is not None and len(device_type) == 4:
             station.device_profile = int.from_bytes(device_type[:2], "little")

@@ -13,6 +13,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from drivers.codec import serial_or_none
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Steps, Write
@@ -67,7 +68,7 @@ def identity(clock: Callable[[], float]) -> Steps[tuple[int | None, bool]]:
     words = yield from read(0, CONFIG_WORDS + 1, clock)
     serial = yield from read(SERIAL_WORD, 2, clock)
     right = words[2 * CHECKSUM_WORD] == checksum(words)
-    return int.from_bytes(serial, "little") or None, right
+    return serial_or_none(int.from_bytes(serial, "little")), right
 
 
 def read(word: int, count: int, clock: Callable[[], float]) -> Steps[bytes]:

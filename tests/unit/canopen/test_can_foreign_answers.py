@@ -11,7 +11,9 @@ import pytest
 
 from drivers.canopen import sdo
 from drivers.canopen.channel import SdoChannel
+from drivers.canopen.frames import Frame
 from drivers.canopen.link import CanopenLink
+from drivers.canopen.nodes import NodeWatch, emergency_text
 from drivers.canopen.scanning import probe
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError
 
@@ -125,3 +127,23 @@ def test_the_request_that_shows_a_node_is_back_is_the_oldest_possible() -> None:
             channel.read(0x6041, 0, 0.0001)
     last = requests[-600:]
     assert all(last[n] not in last[max(n - 254, 0) : n] for n in range(600))
+
+
+@pytest.mark.parametrize("end", [Frame(0x85, bytes(8)), Frame(0x705, b"\0")])
+def test_a_collision_of_identifiers_is_shown_until_it_is_withdrawn(end: Frame) -> None:
+    """Emergency 8150h was shown as the node's state for ever, also after its restart."""
+    watch = NodeWatch()
+    watch.observe(Frame(0x705, b"\x05"), 0.0)
+    watch.observe(Frame(0x85, bytes.fromhex("5081110000000000")), 1.0)
+    record = watch.record(5)
+    assert record.shown_state == emergency_text(0x8150)
+    watch.observe(end, 2.0)
+    assert record.conflict is None
+
+
+def test_a_withdrawn_emergency_is_no_sign_against_two_nodes_with_one_number() -> None:
+    watch = NodeWatch()
+    watch.stray_answer(5, 0.0)
+    assert watch.stray_answer(5, 1.0) is not None
+    watch.observe(Frame(0x85, bytes(8)), 2.0)
+    assert watch.record(5).conflict is not None

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.drive_setup import DriveSetup
-from drivers.canopen.frames import Frame
+from drivers.canopen.frames import NMT_START, Frame
 from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
-from drivers.errors import Rejected
+from drivers.errors import LinkLost, NotAllowed, Rejected
 from drivers.link import Address, CyclicSignal
 
 SPEED = CyclicSignal(5, Address(0x60FF, 0, "INT32"), "speed")
@@ -110,3 +113,149 @@ async def test_the_exchange_starts_from_values_that_come_with_four_bytes() -> No
     finally:
         await cyclic.stop()
     assert node.objects[0x1400, 2] == b"\xff"
+
+
+class StrictNode(Node):
+    """Refuses another identifier while the PDO is valid (CiA 301 clause 7.5.2.35, bits 0 to 29)."""
+
+    def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+        if 0x1400 <= index < 0x1C00 and not index & 0x200 and subindex == 1:
+            before, after = (struct.unpack("<I", d)[0] for d in (self.objects[index, 1], data))
+            if not before & 0x80000000 and (before ^ after) & 0x3FFFFFFF:
+                raise Rejected("not while it is valid", abort_code=0x06090030)
+        super().write(station, index, subindex, data)
+
+
+def other_identifier() -> dict[tuple[int, int], bytes]:
+    return {
+        (0x1400, 1): struct.pack("<I", 0x40000321),
+        (0x1400, 2): b"\xff",
+        (0x1600, 0): b"\x01",
+        (0x1600, 1): struct.pack("<I", 0x60400010),
+    }
+
+
+def test_an_identifier_is_changed_while_its_pdo_is_not_valid() -> None:
+    node = StrictNode(other_identifier())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    assert node.objects[0x1400, 1] == struct.pack("<I", 0x40000205)
+    setup.undo()
+    assert node.objects == other_identifier()
+
+
+def test_an_identifier_that_cannot_be_changed_is_the_reason_that_is_given() -> None:
+    """The put-back of what never changed was refused as well, and hid the reason."""
+    node = Node(other_identifier(), frozenset({(0x1400, 1)}))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    with pytest.raises(NotAllowed, match="does not accept 60FF:00 in the mapping of PDO 1"):
+        setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.undo()
+    assert node.objects == other_identifier()
+
+
+def test_an_identifier_that_is_fixed_but_for_its_valid_bit() -> None:
+    class Fixed(Node):
+        def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+            before = struct.unpack("<I", self.objects[0x1400, 1])[0]
+            if (index, subindex) == (0x1400, 1) and (
+                (before ^ struct.unpack("<I", data)[0]) & 0x3FFFFFFF
+            ):
+                raise Rejected("fixed", abort_code=0x06090030)
+            super().write(station, index, subindex, data)
+
+    node = Fixed(other_identifier())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    with pytest.raises(NotAllowed, match="in the mapping of PDO 1: fixed"):
+        setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.undo()
+    assert node.objects == other_identifier()
+
+
+class Unplugged(Node):
+    """Loses the bus after ``writes`` writes, until ``plugged``."""
+
+    writes = 1000
+
+    def write(self, station: int, index: int, subindex: int, data: bytes) -> None:
+        if self.writes == 0:
+            raise LinkLost("canopen.bus-lost")
+        self.writes -= 1
+        super().write(station, index, subindex, data)
+
+
+def before_the_loss() -> dict[tuple[int, int], bytes]:
+    return other_identifier() | {
+        (0x1016, 1): bytes(4),
+        (0x60C2, 1): b"\x02",
+        (0x60C2, 2): b"\xfd",
+    }
+
+
+@pytest.mark.parametrize("left", range(9))
+def test_what_a_lost_adapter_left_changed_is_restored_when_it_is_back(left: int) -> None:
+    """It was forgotten, and the values of the exchange counted as the drive's own from then on."""
+    node = Unplugged(before_the_loss())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "rx", 0, (SPEED,))])
+    setup.interpolate(5, 0.004)
+    assert setup.guard(5)
+    assert node.objects != before_the_loss()
+    node.writes = left
+    for undo in (setup.unguard, setup.undo):
+        with contextlib.suppress(LinkLost):
+            undo()
+    node.writes = 1000
+    setup.undo()
+    assert node.objects == before_the_loss()
+
+
+async def test_the_next_exchange_begins_with_what_is_still_to_be_restored() -> None:
+    node = Unplugged(before_the_loss() | {(0x6040, 0): b"\x06\0"})
+    port: Any = SimpleNamespace(send=lambda _frame: None)
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    url = parse_canopen_url("canopen://virtual/can0")
+    cyclic = CanopenCyclic(port, url, node.read, node.write, at_once)
+    control = CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")
+    await cyclic.configure([], [control], 0.01)
+    await cyclic.start()
+    node.writes = 0
+    with pytest.raises(LinkLost):
+        await cyclic.stop()
+    node.writes = 1000
+    await cyclic.start()
+    await cyclic.stop()
+    assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()
+
+
+def test_what_could_not_be_restored_is_said_in_the_readers_language() -> None:
+    node = Node(before_the_loss())
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    assert setup.guard(5)
+    node._read_only = frozenset({(0x1016, 1)})
+    with pytest.raises(NotAllowed, match=r"restored: node 5 1016:01 \(the object") as refused:
+        setup.undo()
+    assert "节点 5 的 1016:01" in refused.value.text.words("zh")
+
+
+async def test_a_start_that_fails_at_its_last_step_leaves_nothing_running() -> None:
+    node = Node(before_the_loss() | {(0x6040, 0): b"\x06\0"})
+
+    def send(frame: Frame) -> None:
+        if frame.cob_id == 0 and frame.data[0] == NMT_START:
+            raise LinkLost("canopen.bus-lost")
+
+    async def at_once(work: Callable[[], None]) -> None:
+        work()
+
+    port: Any = SimpleNamespace(send=send)
+    url = parse_canopen_url("canopen://virtual/can0")
+    cyclic = CanopenCyclic(port, url, node.read, node.write, at_once)
+    await cyclic.configure([], [CyclicSignal(5, Address(0x6040, 0, "UINT16"), "control")], 0.01)
+    with pytest.raises(LinkLost):
+        await cyclic.start()
+    assert not cyclic.running
+    assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()

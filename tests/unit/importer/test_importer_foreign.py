@@ -246,3 +246,13 @@ def test_a_dcf_holds_the_number_of_mapped_objects() -> None:
     assert "AccessType=rw\r\n" in section
     assert "DataType=0x0005\r\n" in section
     assert text.count("[1600sub0]") == 1
+
+
+@pytest.mark.parametrize("text", ["0xFFFFFFFF", "0x20012345", "$NODEID+0x20000200"])
+def test_an_identifier_of_29_bits_or_a_placeholder_is_no_identifier(text: str) -> None:
+    """Its lowest 11 bits were taken: 7FFh for a template's FFFFFFFFh."""
+    eds = GOOD_EDS + MAPPED.format(com="1401sub", map="1601sub").replace("$NODEID+0x300", text)
+    pdo = import_file(eds.encode(), "d.eds").profile.pdo
+    assert pdo is not None
+    first = next(each for each in pdo.sets if each.index == 0x1601)
+    assert first.identifier is None
