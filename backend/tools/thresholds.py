@@ -77,6 +77,9 @@ class autotune_gain_steps:
     """[count] Origin: d16e3511."""
     FEW = 8
     """[count] Fewer samples than this in a piece show no bands. Origin: d16e3511."""
+    RECEIVED = 0.9
+    """[ratio] Share of the samples of a steady part without which nothing is concluded from it:
+    a gap of 12 ms may hide an oscillation. Origin: tests/unit/backend/test_gain_steps_lost.py."""
     FALSE_ALARM = 1e-3
     """[ratio] Noise passes for growth in one of so many steps at most, over all bands of a spectrum
     together. Origin: d16e3511."""
