@@ -12,9 +12,7 @@ from backend.tools.gantry import run as gantry
 from backend.tools.gantry.settings import GantrySettings
 from drivers.errors import NotAllowed
 
-SETTINGS = GantrySettings(
-    travel_limit=3.0, speed_limit=600.0, torque_limit=60.0, partner="second"
-)
+SETTINGS = GantrySettings(travel_limit=3.0, speed_limit=600.0, torque_limit=60.0, partner="second")
 
 
 @pytest.mark.parametrize("blocked", [None, 0, 1])
