@@ -266,6 +266,9 @@ class brake_evaluate:
     16e1fbc9."""
     GONE = 0.2
     """[ratio] Below this share of what it was the torque counts as gone. Origin: ca58f5df."""
+    SHORT = 0.95
+    """[ratio] Share of the test torque below which a brake was not tested with it. Origin:
+    ca58f5df."""
 
 
 class brake_texts:
@@ -273,9 +276,6 @@ class brake_texts:
 
     CREPT = 0.05
     """[ratio] Slip below this share of the limit is what an encoder and a settling hub show.
-    Origin: ca58f5df."""
-    SHORT = 0.95
-    """[ratio] Share of the test torque below which the held torque is shown as less than it.
     Origin: ca58f5df."""
 
 
