@@ -77,6 +77,9 @@ class autotune_gain_steps:
     """[count] Origin: d16e3511."""
     FEW = 8
     """[count] Fewer samples than this in a piece show no bands. Origin: d16e3511."""
+    RECEIVED = 0.9
+    """[ratio] Share of the samples of a steady part without which nothing is concluded from it:
+    a gap of 12 ms may hide an oscillation. Origin: tests/unit/backend/test_gain_steps_lost.py."""
     FALSE_ALARM = 1e-3
     """[ratio] Noise passes for growth in one of so many steps at most, over all bands of a spectrum
     together. Origin: d16e3511."""
@@ -263,6 +266,9 @@ class brake_evaluate:
     16e1fbc9."""
     GONE = 0.2
     """[ratio] Below this share of what it was the torque counts as gone. Origin: ca58f5df."""
+    SHORT = 0.95
+    """[ratio] Share of the test torque below which a brake was not tested with it. Origin:
+    ca58f5df."""
 
 
 class brake_texts:
@@ -270,9 +276,6 @@ class brake_texts:
 
     CREPT = 0.05
     """[ratio] Slip below this share of the limit is what an encoder and a settling hub show.
-    Origin: ca58f5df."""
-    SHORT = 0.95
-    """[ratio] Share of the test torque below which the held torque is shown as less than it.
     Origin: ca58f5df."""
 
 

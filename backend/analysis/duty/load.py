@@ -142,11 +142,19 @@ def _refined(correlation: FloatArray, lag: int) -> float:
 
 
 def whole_periods(signals: Signals, period_s: float | None) -> FloatArray:
-    """Return the limits [k + 1] of k whole periods, s; start and end where there is no period."""
+    """Return the limits [k + 1] of k whole periods, s; start and end where there is no period.
+
+    A period that is longer than the recording or shorter than the spacing of its samples is none.
+    """
     begin, duration = float(signals.time_s[0]), signals.duration_s
-    if period_s is None or period_s > duration:
+    if period_s is None or not has_periods(signals, period_s):
         return np.array([begin, begin + duration])
     return np.asarray(begin + period_s * np.arange(int(duration / period_s + 1e-3) + 1))
+
+
+def has_periods(signals: Signals, period_s: float) -> bool:
+    """Whether the recording contains a whole period, with samples in it."""
+    return signals.spacing_s <= period_s <= signals.duration_s
 
 
 def effective_torque(signals: Signals, moments: FloatArray) -> Effective:

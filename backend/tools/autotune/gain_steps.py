@@ -60,14 +60,15 @@ async def gain_steps(
 ) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
 
-    ``present`` is the same step at the unchanged gain.
+    ``present`` is the same step at the unchanged gain. A step of which too many samples were lost
+    shows nothing: no gain is raised further then.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; an oscillation is not an error.
     """
     drive = axis.drive
     key = gain_tool.spec_of(drive).speed
-    if key is None:
+    if key is None or not received(present, settings):
         return GainSteps(0.0, None, ())
     parameter = drive.parameter(key)
     now = await drive.raw(key)
@@ -91,6 +92,8 @@ async def gain_steps(
                     raise
                 done.append(GainStep(real_db, float("inf"), False))
                 break
+        if not received(step, settings):
+            break
         done.append(judged(step, present, settings, real_db))
         if not done[-1].stable:
             break
@@ -176,11 +179,22 @@ def _grows(torque: npt.NDArray[np.float64], before: npt.NDArray[np.float64], fac
     return bool(np.any((bands[-1] > least) & (bands[-1] > threshold.GROWS**2 * bands[0])))
 
 
+def received(step: StepResult, settings: StepSettings) -> bool:
+    """Whether the torque that is judged was received: interpolated samples do not oscillate."""
+    if step.valid is None:
+        return True
+    return float(np.mean(step.valid[_judged_part(step, settings)])) >= threshold.RECEIVED
+
+
+def _judged_part(step: StepResult, settings: StepSettings) -> npt.NDArray[np.bool_]:
+    """The second half of the constant-speed phase [n]."""
+    begin, end = LEAD_S + 0.5 * settings.hold_s, LEAD_S + settings.hold_s
+    return np.asarray((step.time_s >= begin) & (step.time_s < end))
+
+
 def _steady(step: StepResult, settings: StepSettings) -> npt.NDArray[np.float64]:
     """Torque in the second half of the constant-speed phase, without its quadratic trend."""
-    time = step.time_s
-    begin = LEAD_S + 0.5 * settings.hold_s
-    part = step.torque_percent[(time >= begin) & (time < LEAD_S + settings.hold_s)]
+    part = step.torque_percent[_judged_part(step, settings)]
     if part.size < 8:
         return np.zeros(8)
     x = np.linspace(-1.0, 1.0, part.size)

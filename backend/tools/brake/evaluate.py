@@ -139,7 +139,7 @@ def evaluate(test: Trials, settings: BrakeSettings, facts: AxisFacts) -> BrakeRe
     if rated is not None and settings.brake_rated_nm is not None:
         of_brake = least * rated / settings.brake_rated_nm
     obstacle: Obstacle | None = None
-    if verdict == "cannot_be_tested":
+    if verdict == "cannot_be_tested" and any(trial.halted for trial in test.trials):
         obstacle = "windup_beyond_limit"
     return BrakeResult(
         verdict=verdict, obstacle=obstacle, means=test.means, measured_at=test.measured_at,
@@ -159,6 +159,7 @@ class _Way:
 
     def __init__(self, trial: Trial, test: Trials, rated_nm: float, limit_rev: float) -> None:
         self._trial, self._limit, self._rate = trial, limit_rev, test.sample_rate_hz
+        self._asked = test.test_percent
         self._step = 100.0 * test.torque_step_nm / rated_nm
         start = self._still(trial.position_rad, Phase.LEAD)
         self._travel = trial.direction * (trial.position_rad - start) / _TURN
@@ -209,6 +210,9 @@ class _Way:
         else:
             carried = float(np.mean(self._torque[top]))
             ends = (carried, carried)
+        if verdict == "held" and carried < threshold.SHORT * self._asked:
+            # Of a brake that carries what the drive reached, nothing is known beyond that.
+            verdict = "cannot_be_tested"
         return self._made(verdict, carried, ends, way, compliance, slip, loading), compliance
 
     def _slip(self, travel_0: float, beyond: FloatArray) -> float:

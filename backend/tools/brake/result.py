@@ -20,7 +20,7 @@ Obstacle = Literal[
     "no_torque_mode",
     "windup_beyond_limit",
 ]
-"""Reason why a brake cannot be tested."""
+"""Reason why a brake cannot be tested; none where the drive did not reach the test torque."""
 Means = Literal["output", "supply"]
 """What keeps the brake closed: its output has another function, or its supply is disconnected."""
 

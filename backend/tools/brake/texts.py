@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Literal
 
 from backend.tools.brake.result import BrakeResult, BrakeWay, Verdict
+from backend.tools.thresholds import brake_evaluate
 from backend.tools.thresholds import brake_texts as threshold
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
@@ -208,8 +209,10 @@ def notes(result: BrakeResult) -> list[Note]:
         for way in result.ways
         if way.verdict == "held" and way.slip_rev > threshold.CREPT * result.slip_limit_rev
     ]
-    least = threshold.SHORT * result.test_percent
-    if result.verdict == "held" and value is not None and value < least:
+    least = brake_evaluate.SHORT * result.test_percent
+    # Results of older versions call it held.
+    reached = result.verdict in ("held", "cannot_be_tested") and result.obstacle is None
+    if reached and value is not None and value < least:
         found.append(Note("torque_short", "warn", {"value": shown}))
     if result.means is not None:
         found.append(Note(f"by.{result.means}"))

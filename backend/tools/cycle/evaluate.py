@@ -102,6 +102,7 @@ def evaluate(samples: Samples, settings: CycleSettings, facts: CycleFacts) -> Cy
         raise NotAllowed("cycle.too-few-samples", value=count, limit=str(_FEWEST))
     period = settings.period_s or load.period_of(signals)
     moments = load.whole_periods(signals, period)
+    whole = period is not None and load.has_periods(signals, period)
     effective = load.effective_torque(signals, moments)
     peak = float(np.max(np.abs(signals.torque_percent)))
     fastest = float(np.max(np.abs(signals.speed_rpm)))
@@ -118,7 +119,7 @@ def evaluate(samples: Samples, settings: CycleSettings, facts: CycleFacts) -> Cy
         verdict=_verdict(idle, warm, budget), recording=settings.recording,
         duration_s=signals.duration_s, samples=int(signals.time_s.size),
         sample_rate_hz=1.0 / signals.spacing_s, longest_gap_s=signals.longest_gap_s,
-        period_s=period, periods=int(moments.size - 1) if period is not None else 0,
+        period_s=period, periods=int(moments.size - 1) if whole else 0,
         rated_torque_nm=facts.rated_torque_nm, rated_speed_rpm=facts.rated_speed_rpm,
         rms_percent=effective.value, rms_ci95_percent=effective.ci95, peak_percent=peak,
         peak_limit_percent=facts.peak_percent,

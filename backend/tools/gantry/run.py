@@ -29,6 +29,7 @@ from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.pair import Pair, play_pair
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.measuring.temporary import stopping_hard
+from backend.tools.moves.go_back import require_back
 from backend.tools.moves.raised_cosine import raised_cosine
 from backend.tools.notch.filters import read_notches
 from backend.tools.notch.meaning import meaning_of
@@ -195,7 +196,8 @@ async def _go_back(pair: Pair, settings: GantrySettings) -> None:
     """Move both axes home together, each by its own distance, so that the skew ends as it began.
 
     Raises:
-        NotAllowed: the envelope, the skew limit or a fault ended the motion.
+        NotAllowed: the envelope, the skew limit or a fault ended the motion, or an axis did not
+            arrive.
     """
     rate = 1.0 / cycle_s(pair.session)
     highest_rps = threshold.BACK * settings.speed_limit / 60.0
@@ -212,6 +214,8 @@ async def _go_back(pair: Pair, settings: GantrySettings) -> None:
         await play_pair(
             pair, 60.0 * speeds, settings.envelope, settings.skew_limit_rev, lambda _done: None
         )
+    for axis, way in zip(pair.axes, await pair.ways_rev(), strict=True):
+        require_back(axis, way, settings.travel_limit)
 
 
 async def _data(

@@ -61,15 +61,23 @@ async def go_back(
             continue
         before, rest = rest, units.position(goal_raw - await axis.position_raw())
         moves.append((distance, before - rest))
-    # Whatever comes next would count its travel from elsewhere.
-    far = max(threshold.FAR_REV, threshold.FAR * envelope.travel_rev)
-    if abs(rest) > far:
+    require_back(axis, rest, envelope.travel_rev)
+
+
+def require_back(axis: Axis, rest_rev: float, travel_rev: float) -> None:
+    """Check that an axis has come back: whatever comes next would count its travel from elsewhere.
+
+    Raises:
+        NotAllowed: it is farther away than its accuracy explains.
+    """
+    far = max(threshold.FAR_REV, threshold.FAR * travel_rev)
+    if abs(rest_rev) > far:
         raise NotAllowed(
             "moves.not-back",
             drive=axis.drive.name,
-            value=round(rest, 4),
+            value=round(rest_rev, 4),
             limit=f"{far:.3g} rev",
-            away_rev=abs(rest),
+            away_rev=abs(rest_rev),
         )
 
 

@@ -55,6 +55,8 @@ class StepResult:
     """The settling window, in rpm or rev."""
     widened: bool = False
     """Whether noise exceeds a tenth of the usual window, so that a wider one was used."""
+    valid: npt.NDArray[np.bool_] | None = None
+    """Which samples were received [n]; the others are interpolated. None where all were."""
 
 
 def evaluate(
@@ -90,7 +92,7 @@ def evaluate(
     return StepResult(
         settings.kind, time, demand, actual, torque, step, move,
         float(np.max(np.abs(torque))), float(np.sqrt(np.mean(torque**2))),
-        noise, window, widened,
+        noise, window, widened, recording.valid[: time.size],
     )  # fmt: skip
 
 

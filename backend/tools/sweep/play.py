@@ -51,11 +51,20 @@ async def scaled_by_speed(
     home: int,
     progress: Progress,
 ) -> tuple[excite.Sequence, ...]:
-    """Scale the excitation so that its torque has the wanted share."""
+    """Scale the excitation so that its torque has the wanted share.
+
+    Raises:
+        NotAllowed: as `play_fitting`, or the torque that the drive reports does not change.
+    """
     trial = Progress(lambda: progress(0.09, text("sweep.feeling-how-much-torque")))
     ((sent, recording),) = await play_fitting(
         axis, session, settings, setup, sequences[:1], home, trial
     )
+    seen = recording.torque_nm[recording.valid]
+    if not float(np.ptp(seen)) > 0.0:
+        drive = axis.drive
+        key = drive.require("torque_actual")
+        raise NotAllowed("sweep.torque-not-change", drive=drive.name, parameter=key)
     share_nm = settings.share * setup.room.torque_nm
     size = speed_injection.fitting_size(
         sent, recording, setup.room, share_nm, watched=not session.unwatched(axis.drive)

@@ -128,6 +128,20 @@ def test_windup_alone_that_reaches_the_limit_is_no_slip() -> None:
     assert (found.verdict, found.obstacle) == ("cannot_be_tested", "windup_beyond_limit")
 
 
+@pytest.mark.parametrize("share", [0.0, 0.5, 0.9])
+def test_a_brake_is_not_held_with_less_than_the_test_torque(share: float) -> None:
+    """A limit of the drive: of a brake that carries so much, nothing is known beyond that."""
+    weak = trial(1)
+    limit = share * float(np.max(weak.torque_nm))
+    weak.torque_nm[:] = np.minimum(weak.torque_nm, limit)
+    found = found_of(weak, trial(-1))
+    assert (found.verdict, found.obstacle) == ("cannot_be_tested", None)
+    assert [way.verdict for way in found.ways] == ["cannot_be_tested", "held"]
+    assert found.torque_percent == pytest.approx(100.0 * share, abs=0.5)
+    names = [note.name for note in report(found).notes]
+    assert names == ["verdict.cannot_be_tested", "torque_short", "by.output", "measured_at"]
+
+
 def test_of_the_brakes_rating_and_again_from_a_file() -> None:
     data = trials(trial(1, 75.0), trial(-1))
     asked = ASKED.model_copy(update={"brake_rated_nm": 3.0})

@@ -61,6 +61,20 @@ def test_the_verdict(peak: float, verdict: str, words: str) -> None:
     assert result.period_s == pytest.approx(2.0, rel=0.01)
 
 
+def test_a_stated_period_longer_than_the_recording_is_not_a_whole_one() -> None:
+    result = found(60.0, period_s=100.0)
+    assert (result.period_s, result.periods) == (100.0, 0)
+    assert any(each.startswith("Only 0 whole cycles") for each in said(result))
+    assert result.rms_percent == pytest.approx(60.0, rel=0.01)
+
+
+def test_a_stated_period_without_samples_in_it_is_none() -> None:
+    """A time in ns would need a table of 2·10¹⁰ periods, more than this computer holds."""
+    result = found(60.0, period_s=1e-9)
+    assert result.periods == 0
+    assert result.rms_percent == pytest.approx(60.0, rel=0.01)
+
+
 def test_it_trips_after_minutes_that_follow_from_the_catalogue() -> None:
     result = found(200.0, thermal_time_min=20.0)
     assert result.heat is not None

@@ -47,4 +47,6 @@ sweep_torque-at-limit = the torque was at its limit, or not what was commanded, 
 sweep_torque-cut = for { NUM($cut_share, format: ".0%") } of the measurement the torque stayed at one level although more was commanded, so the response cannot be identified. Raise the drive's torque limits, or lower the torque of the measurement
 sweep_torque-follows-slowly = the torque follows its command more slowly than a current loop: a low-pass of the torque is set in the drive (torque filter), which limits every loop. The uncertainty of its form widens the band
 sweep_torque-is-commanded = the drive reports the commanded torque: the delay of its current loop is not known and widens the band
+sweep_torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change with the speed setpoints; the mechanics cannot be measured by them
+    .remedy = use a drive or a bus that reports the actual torque with every cycle
 sweep_torque-not-used = the torque that the drive reports (6077h) is not the torque that moves the axis; it may be filtered, or a copy of the demand. It was not used: the response was identified from the motion alone

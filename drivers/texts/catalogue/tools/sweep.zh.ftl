@@ -47,4 +47,6 @@ sweep_torque-at-limit = 转矩在 { NUM($share, format: ".0%") } 的时间内达
 sweep_torque-cut = 测量中有 { NUM($cut_share, format: ".0%") } 的时间指令更大而转矩停在同一水平，因此无法辨识响应。请提高驱动器的转矩限值，或减小测量转矩
 sweep_torque-follows-slowly = 转矩跟随指令比电流环慢：驱动器中设置了转矩低通（转矩滤波器），它限制所有环路。其形式的影响已计入误差带
 sweep_torque-is-commanded = 驱动器上报的是指令转矩：其电流环的延迟未知，已计入误差带
+sweep_torque-not-change = { $drive }：其实际转矩（{ $parameter }）不随速度给定值变化，因此无法测量机械特性
+    .remedy = 请使用每个周期都上报实际转矩的驱动器或总线
 sweep_torque-not-used = 驱动器报告的转矩（6077h）不是驱动轴的转矩，可能经过滤波，或为指令的副本。未使用该转矩，响应仅由运动辨识

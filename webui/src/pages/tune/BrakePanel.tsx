@@ -173,7 +173,8 @@ export function notesOf(result: BrakeResult, text: Text): ShownNote[] {
       found.push({ words: text('crept', { value: engineering(way.slip_rev) }), tone: 'warn' })
     }
   }
-  if (verdict === 'held' && carried != null && carried < SHORT * result.test_percent) {
+  const reached = ['held', 'cannot_be_tested'].includes(verdict) && !obstacle
+  if (reached && carried != null && carried < SHORT * result.test_percent) {
     found.push({ words: text('torque_short', { value: shown }), tone: 'warn' })
   }
   if (means) found.push({ words: text(`by.${means}`), tone: 'info' })
