@@ -26,6 +26,7 @@ def _entries(lines: Iterable[str]) -> Iterator[AuditEntry]:
     for number, line in enumerate(lines, 1):
         try:
             content = json.loads(line)
+            str(content["body"]).encode()  # half a surrogate pair is in no entry
             yield AuditEntry(
                 number=int(content["number"]),
                 previous=str(content["previous"]),
@@ -33,5 +34,5 @@ def _entries(lines: Iterable[str]) -> Iterator[AuditEntry]:
                 body=str(content["body"]),
                 **columns(str(content["body"])),
             )
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
             raise NotAllowed("audit.line-no-entry-audit", value=line[:80], number=number) from error

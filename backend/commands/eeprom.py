@@ -81,8 +81,7 @@ def compare(
     async def work() -> bool:
         data = file.read_bytes()
         if is_xml(data):
-            number = None if product_code is None else int(product_code, 0)
-            profile = _profile_of(data, file.name, number)
+            profile = _profile_of(data, file.name, _number(product_code))
             image = Image(await _contents(url, station, None, server))
             found = against_profile(image, profile)
         else:
@@ -255,6 +254,15 @@ async def _contents(url: str, station: int, size: int | None, server: str | None
         segment = _segment(link)
         await segment.scan(show_progress)
         return (await segment.eeprom.read(station, show_progress, size)).data
+
+
+def _number(product_code: str | None) -> int | None:
+    try:
+        return None if product_code is None else int(product_code, 0)
+    except ValueError as error:
+        raise NotAllowed(
+            "command.no-number", value=product_code, option="--product-code"
+        ) from error
 
 
 def _profile_of(data: bytes, name: str, product_code: int | None) -> Profile:

@@ -65,7 +65,7 @@ def permit(
 ) -> None:
     """Permit the baseline's measurements without a person. The axis moves later."""
     body = {
-        "until": (datetime.now(UTC) + timedelta(days=for_days)).isoformat(),
+        "until": _end(for_days).isoformat(),
         "days": _days(days),
         "at": _time(at).isoformat(),
         "trigger": trigger,
@@ -133,6 +133,13 @@ def _days(names: str) -> list[int]:
         return [_DAYS.index(each.strip().lower()[:3]) for each in names.split(",") if each.strip()]
     except ValueError as error:
         raise typer.BadParameter(", ".join(_DAYS), param_hint="--days") from error
+
+
+def _end(days: int) -> datetime:
+    try:
+        return datetime.now(UTC) + timedelta(days=days)
+    except OverflowError as error:
+        raise typer.BadParameter(str(days), param_hint="--for-days") from error
 
 
 def _time(at: str) -> time:

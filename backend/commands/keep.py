@@ -128,7 +128,8 @@ def verify(
     """Check the whole chain; the exit code is 1 where it is broken."""
     known = _anchor(anchor)
     if file is not None:
-        with file.open(encoding="utf-8") as lines:
+        # What is not UTF-8 is replaced, so that its entry counts as changed.
+        with file.open(encoding="utf-8", errors="replace") as lines:
             verdict = check_lines(lines, known)
     else:
         records = _existing(config, database)
@@ -145,7 +146,7 @@ def _anchor(text: str) -> Anchor | None:
     if not text:
         return None
     number, _, digest = text.partition(":")
-    if not number.isdigit() or len(digest) != 64:
+    if not (number.isascii() and number.isdigit() and len(number) < 19) or len(digest) != 64:
         raise NotAllowed("command.no-anchor", value=text, limit="NUMBER:HASH")
     return Anchor(int(number), digest.lower())
 

@@ -127,14 +127,23 @@ async def _page(server: str) -> AsyncIterator[ClientConnection]:
     """A live connection like that of a page, after the server's greeting."""
     address = server.rstrip("/").replace("http", "ws", 1) + "/api/v1/live"
     headers = {**authorisation(), "Accept-Language": language()}
-    try:
-        async with connect(
-            address, additional_headers=headers, open_timeout=_OPEN_S, max_size=None
-        ) as page:
+    async with contextlib.AsyncExitStack() as opened:
+        try:
+            page = await opened.enter_async_context(
+                connect(address, additional_headers=headers, open_timeout=_OPEN_S, max_size=None)
+            )
             await _next(page, Hello)
+        except (WebSocketException, TimeoutError, OSError) as error:
+            raise _failed(server, error) from error
+        try:
             yield page
-    except (WebSocketException, TimeoutError, OSError) as error:
-        raise LinkLost("command.live-connection-failed", server=server, cause=str(error)) from error
+        # Not an OSError: the file that samples are written to may have failed.
+        except (WebSocketException, TimeoutError) as error:
+            raise _failed(server, error) from error
+
+
+def _failed(server: str, error: Exception) -> LinkLost:
+    return LinkLost("command.live-connection-failed", server=server, cause=str(error))
 
 
 def _reported(message: str) -> Hello | JogEnded | ScopeInfo | None:

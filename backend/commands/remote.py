@@ -8,6 +8,7 @@ server; where it is not in the server's axis list yet, it is connected.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import ssl
 from collections.abc import AsyncIterator
@@ -85,7 +86,14 @@ class Remote:
         Raises:
             NotAllowed: it failed or was cancelled; the message is the server's.
         """
-        job = await self.ask("POST", path, JobInfo, body=body)
+        # Not cancelled halfway: a job whose id is not known yet could not be ended.
+        starting = asyncio.ensure_future(self.ask("POST", path, JobInfo, body=body))
+        try:
+            job = await asyncio.shield(starting)
+        except asyncio.CancelledError:
+            with contextlib.suppress(DriveError):
+                await self.raw("DELETE", f"/jobs/{(await starting).id}")
+            raise
         try:
             while job.state == "running":
                 await asyncio.sleep(_LOOK_S)

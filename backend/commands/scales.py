@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import re
@@ -229,8 +230,14 @@ def _farther(increments: int, most: int) -> int:
 def _turned(increments: int) -> float | None:
     """Revolutions of the shaft as a person saw them; None: too few to decide, move further."""
     question = words_of("printed.how-far", increments=increments)
-    answer = str(typer.prompt(question, default="", show_default=False))
-    return float(answer.replace(",", ".")) if answer.strip() else None
+    while True:
+        answer = str(typer.prompt(question, default="", show_default=False)).strip()
+        if not answer:
+            return None
+        # The axis has moved already: a slip of the keyboard must not make it move again.
+        with contextlib.suppress(ValueError):
+            if math.isfinite(turned := float(answer.replace(",", "."))):
+                return turned
 
 
 def _print(scales: tuple[Scale, ...], *, as_json: bool = False) -> None:

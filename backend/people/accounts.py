@@ -123,9 +123,17 @@ class Accounts:
         await self._end([session])
 
     async def _begin(self, account: Account, client: str) -> tuple[str, LoginSession]:
+        """Begin a session.
+
+        Raises:
+            NotLoggedIn: the account was removed, or has another password, since it was checked.
+        """
         secret, now = new_secret(), self._now()
         session = LoginSession(digest(secret), account.id, now, now, client[:200])
         async with self._changing:
+            known = self.directory.find(account.name)
+            if known is None or (known.id, known.password) != (account.id, account.password):
+                raise NotLoggedIn("people.name-password-wrong")
             await self._store.call(changes.add_session, self._store, session)
             self.directory.begin(session)
         return secret, session

@@ -12,8 +12,6 @@ from backend.recording.chunks import Samples
 from backend.recording.reader import BlockRef, RecordingReader
 
 WINDOW_S = 1.0
-#: Largest number of samples of one stream in the same nanosecond that keep separate rows.
-_SAME = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +48,10 @@ def merged(reader: RecordingReader) -> Iterator[Rows]:
         for ref in windows[number]:
             block = reader.block(ref)
             inside = np.floor((block.times_s - base) / WINDOW_S).astype(int) == number
-            parts.append((block, inside))
-        yield _merge(parts, base, places, len(reader.channels))
+            if inside.any():
+                parts.append((block, inside))
+        if parts:  # nothing may have been sampled for a second
+            yield _merge(parts, base, places, len(reader.channels))
 
 
 def _window(t_s: float, base: float) -> int:
@@ -64,10 +64,11 @@ def _merge(
     places: dict[int, list[int]],
     channels: int,
 ) -> Rows:
-    keyed: list[tuple[int, npt.NDArray[np.int64], npt.NDArray[np.float64], npt.NDArray[np.int8]]]
-    keyed = []
+    found = []
+    #: Samples of one stream in the same nanosecond, which keep separate rows.
+    same = 1
     for stream in places:
-        mine = [(b, inside) for b, inside in parts if b.stream == stream and inside.any()]
+        mine = [(b, inside) for b, inside in parts if b.stream == stream]
         if not mine:
             continue
         times = np.concatenate([b.times_s[inside] for b, inside in mine])
@@ -78,7 +79,11 @@ def _merge(
         ns, values, valid = ns[order], values[order], valid[order]
         _, first, counts = np.unique(ns, return_index=True, return_counts=True)
         again = np.arange(len(ns)) - np.repeat(first, counts)
-        keyed.append((stream, ns * _SAME + np.minimum(again, _SAME - 1), values, valid))
+        same = max(same, int(counts.max()))
+        found.append((stream, ns, again, values, valid))
+    keyed = [
+        (stream, ns * same + again, values, valid) for stream, ns, again, values, valid in found
+    ]
     keys = np.unique(np.concatenate([key for _, key, _, _ in keyed]))
     table = np.full((len(keys), channels), np.nan)
     present = np.zeros((len(keys), channels), dtype=bool)
@@ -88,7 +93,7 @@ def _merge(
         table[np.ix_(rows, columns)] = values
         present[np.ix_(rows, columns)] = True
         marks[rows, stream] = valid
-    return Rows(keys // _SAME, table, present, marks)
+    return Rows(keys // same, table, present, marks)
 
 
 def _marks(block: Samples) -> npt.NDArray[np.int8]:

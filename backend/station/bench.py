@@ -91,6 +91,11 @@ class Bench:
         self.state_folder = state_folder
         self.axis_records = AxisStore(state_folder / "axes")
         self._list = DriveList(state_folder / "bench.json")
+        #: Drives of the list that could not be connected, and ports of connected ones by drive id:
+        #: they stay in the list, as an adapter may be missing at one start only.
+        self._unreached: list[SavedDrive] = []
+        self._unreached_ports: dict[str, tuple[SavedPort, ...]] = {}
+        self._restoring = False
 
     # --- cyclic exchange --------------------------------------------------------------
 
@@ -275,6 +280,7 @@ class Bench:
                     (self.buses.url_of(p), p.station) for p in connected.drive.ports
                 )
             del self.connected_drives[drive_id]
+            self._unreached_ports.pop(drive_id, None)
             # Pending restores are shown first on an axis' pages: whoever removes it has read them.
             connected.drive.pending_restores.settle(
                 [entry.key for entry in connected.drive.pending_restores.entries]
@@ -365,7 +371,12 @@ class Bench:
     # --- across restarts --------------------------------------------------------------
 
     def _remember(self) -> None:
-        """Store the list of drives; a failure is logged and does not stop the bench."""
+        """Store the list of drives; a failure is logged and does not stop the bench.
+
+        While the drives of the list are being connected, it stays as it is.
+        """
+        if self._restoring:
+            return
         try:
             self._save()
         except StorageFailed as error:
@@ -373,40 +384,68 @@ class Bench:
             self.journal.add(line, level="error")
 
     def _save(self) -> None:
-        self._list.store(
+        here = [
             SavedDrive(
                 name=m.drive.name,
                 notes=m.drive.notes,
                 profile=m.drive.profile.drive,
-                ports=tuple(SavedPort(self.buses.url_of(p), p.station) for p in m.drive.ports),
+                ports=self._ports_of(m.drive),
                 serial=m.drive.found.serial if m.drive.found else None,
             )
             for m in self.connected_drives.values()
-        )
+        ]
+        # Whoever connects another drive at the same place has replaced the one of the list.
+        taken = {port for drive in here for port in drive.ports}
+        self._unreached = [each for each in self._unreached if not taken & set(each.ports)]
+        self._list.store([*here, *self._unreached])
+
+    def _ports_of(self, drive: Drive) -> tuple[SavedPort, ...]:
+        ports = [SavedPort(self.buses.url_of(port), port.station) for port in drive.ports]
+        more = (p for p in self._unreached_ports.get(drive.id, ()) if p not in ports)
+        return (*ports, *more)
 
     async def restore(self) -> None:
-        """Connect the drives of the last session; those that fail are logged and left out."""
+        """Connect the drives of the last session.
+
+        Those that fail are logged, and stay in the list for the next start.
+        """
         await self.records.open()
         saved, problems = self._list.load()
         for problem in problems:
             self.journal.add(problem, level="error")
-        for item in saved:
+        self._restoring = True
+        try:
+            for item in saved:
+                await self._restore_drive(item)
+        finally:
+            self._restoring = False
+
+    async def _restore_drive(self, item: SavedDrive) -> None:
+        first, *others = item.ports
+        try:
+            connected = await self.connect(first.url, first.station, item.profile, item.name)
+        except (DriveError, ProfileError) as error:
+            self._unreached.append(item)
+            self._not_connected(item, error)
+            return
+        drive = connected.drive
+        drive.notes = item.notes
+        if item.serial is not None:
+            drive.found = Found(first.station, serial=item.serial)
+        for other in others:
             try:
-                first, *others = item.ports
-                connected = await self.connect(first.url, first.station, item.profile, item.name)
-                connected.drive.notes = item.notes
-                for other in others:
-                    await self.add_port(connected.drive.id, other.url, other.station)
-            except (DriveError, ProfileError) as error:
-                why = (
-                    profile_error_text(error) if isinstance(error, ProfileError) else why_of(error)
-                )
-                line = text("journal.not-connected", drive=item.name, cause=why)
-                self.journal.add(line, level="warning")
-                continue
-            if item.serial is not None:
-                connected.drive.found = Found(first.station, serial=item.serial)
-                self.reconnection.returned(connected.drive.id)
+                await self.add_port(drive.id, other.url, other.station)
+            except DriveError as error:
+                missing = self._unreached_ports.get(drive.id, ())
+                self._unreached_ports[drive.id] = (*missing, other)
+                self._not_connected(item, error)
+        if item.serial is not None:
+            self.reconnection.returned(drive.id)
+
+    def _not_connected(self, item: SavedDrive, error: DriveError | ProfileError) -> None:
+        why = profile_error_text(error) if isinstance(error, ProfileError) else why_of(error)
+        line = text("journal.not-connected", drive=item.name, cause=why)
+        self.journal.add(line, level="warning")
 
     async def close(self) -> None:
         """Stop all motion, then close every bus; a failure does not prevent the other steps."""

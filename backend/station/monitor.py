@@ -146,7 +146,10 @@ class Monitor:
                 # A monitor that ended unnoticed would show its last state as the present one.
                 log.exception("the state of %s cannot be shown", self.axis.drive.name)
                 problem = internal_error(error)
-                self.snapshot = replace(self.snapshot, fresh=False, problem=problem)
+                self.snapshot = replace(self.snapshot, fresh=False, problem=problem, turning=None)
+                # Pages show what they were sent last. What listens may be the defect itself.
+                with contextlib.suppress(Exception):
+                    self._changed(self.snapshot)
             self._wake.clear()
             period = WATCHED_S if self.watchers else IDLE_S
             with contextlib.suppress(TimeoutError):

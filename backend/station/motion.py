@@ -201,6 +201,10 @@ class Motion:
                 await connected.axis.stop()
             except DriveError as error:
                 problem = error.text
+            except Exception as error:
+                # A defect at one axis must not hide the results of the others.
+                log.exception("the stop of %s failed", connected.drive.name)
+                problem = internal_error(error)
             self._begin_watch(connected, problem)
             connected.monitor.hurry()
             return problem
@@ -285,15 +289,14 @@ class Motion:
             connected.monitor.hurry()
 
     async def let_go_of(self, connected: ConnectedDrive) -> None:
-        """Switch off the power of an axis now; on failure its stop is pending; no DriveError."""
+        """Switch off the power of an axis now; on failure its stop is pending; no error."""
         try:
             await connected.axis.let_go()
-        except DriveError as error:
+        except Exception as error:
             # The stop is sent as soon as the drive answers, also after it was added again.
             connected.axis.stop_pending = True
-            line = text(
-                "station.may-still-be-enabled", drive=connected.drive.name, cause=error.text
-            )
+            cause = error.text if isinstance(error, DriveError) else internal_error(error)
+            line = text("station.may-still-be-enabled", drive=connected.drive.name, cause=cause)
             self._bench.journal.add(line, level="error", drive=connected.drive.id)
 
     async def let_go_of_all(self) -> None:

@@ -85,8 +85,13 @@ class Reconnection:
             await drive.read_many(keys, progress)
             return {"parameters": len(keys)}
 
+        # Not limited in number: the drives of a whole bench may return at one moment.
         self._bench.jobs.start(
-            "reread", text("station.read-anew", drive_name=drive.name), reread, drive=drive_id
+            "reread",
+            text("station.read-anew", drive_name=drive.name),
+            reread,
+            drive=drive_id,
+            by_person=False,
         )
 
     async def _is_the_same(self, connected: ConnectedDrive) -> bool:

@@ -20,6 +20,7 @@ from fluent.runtime.types import FluentInt, FluentType
 from drivers.texts.message import JOINED, PROSE, Language, Param, Text
 
 CATALOGUE = Path(__file__).with_name("catalogue")
+_LONG = 10**18
 _LOCALES: dict[Language, str] = {"en": "en", "zh": "zh-Hans"}
 
 
@@ -122,7 +123,9 @@ def _argument(value: Param, language: Language) -> object:
     if isinstance(number, Enum):
         return _as_words(value, language)
     if isinstance(number, Integral):
-        return FluentInt(int(number), useGrouping=False)
+        whole = int(number)
+        # The library cannot write a number of more than 28 digits; some client may send one.
+        return FluentInt(whole, useGrouping=False) if abs(whole) < _LONG else str(whole)
     if isinstance(number, Real):
         return _Real(float(number))
     return _as_words(value, language)

@@ -74,3 +74,10 @@ def test_several_messages_are_joined_as_each_language_does() -> None:
     both = joined([LOW, LEFT_OUT])
     assert both.words("en").count("; ") == 1
     assert both.words("zh").count("；") == 1
+
+
+def test_a_number_of_any_length_is_written() -> None:
+    for number in (10**18 - 1, 10**18, -(10**30), 10**300):
+        shown = text("sets.row-no-value", row=number, raw="x")
+        assert str(number) in shown.words("en")
+        assert str(number) in shown.words("zh")

@@ -50,12 +50,13 @@ class PeopleControl:
                 leases.ask(drive, page.id, identity.person)
                 line = text("journal.asks-control", person=identity.person)
                 self._log(drive, "asks", line, identity)
+            case LeaseAnswer() if not self._is_asked(drive, page):
+                pass  # the answer is late: control has passed on, or the request is gone
             case LeaseAnswer(give=True):
-                if leases.asked(drive) is not None:
-                    page.release(drive, text("jog.end-control-handed-over"))
-                    leases.give(drive, page.id)
-                    line = text("journal.gives-control", person=identity.person)
-                    self._log(drive, "gives", line, identity)
+                page.release(drive, text("jog.end-control-handed-over"))
+                leases.give(drive, page.id)
+                line = text("journal.gives-control", person=identity.person)
+                self._log(drive, "gives", line, identity)
             case LeaseAnswer():
                 leases.refuse(drive, page.id)
                 line = text("journal.keeps-control", person=identity.person)
@@ -73,6 +74,12 @@ class PeopleControl:
                 self._log(drive, "hands over", line, identity)
             case LeaseOverride():
                 await self._override(page, identity, drive)
+
+    def _is_asked(self, drive: str, page: Page) -> bool:
+        """Whether this page holds control and somebody asks it for control."""
+        holder = self._bench.leases.holder(drive)
+        asked = self._bench.leases.asked(drive)
+        return asked is not None and holder is not None and holder.connection == page.id
 
     async def _override(self, page: Page, identity: Identity, drive: str) -> None:
         holder = self._bench.leases.holder(drive)

@@ -38,6 +38,11 @@ def framing(headers: Iterable[tuple[bytes, bytes]]) -> tuple[str | None, bool]:
     return (lengths[0].decode("latin-1") if lengths else None), bool(codings)
 
 
+def is_json(headers: Iterable[tuple[bytes, bytes]]) -> bool:
+    """Whether a request says that its body is JSON."""
+    return any(key == b"content-type" and b"json" in value.lower() for key, value in headers)
+
+
 #: In JSON, a character beyond U+FFFF is written as two of these; a single one is not a character.
 _HALF = re.compile(rb"\\u[dD][89a-fA-F]")
 
@@ -68,15 +73,24 @@ def has_half_characters(body: bytes) -> bool:
 
 
 class MeasuredBody:
-    """Receiving side of a request, with size limit and deadline. ``refused``: status, or 0."""
+    """Receiving side of a request, with size limit and deadline. ``refused``: status, or 0.
+
+    A body that may be a file is checked for half characters only where it is sent as JSON.
+    """
 
     def __init__(
-        self, receive: Receive, limit_bytes: int, declared: str | None, chunked: bool
+        self,
+        receive: Receive,
+        limit_bytes: int,
+        declared: str | None,
+        chunked: bool,
+        *,
+        is_json: bool = False,
     ) -> None:
         self._receive = receive
         self._limit = limit_bytes
         self._seen = 0
-        self._kept: list[bytes] | None = [] if limit_bytes <= _SMALL else None
+        self._kept: list[bytes] | None = [] if is_json or limit_bytes <= _SMALL else None
         self._ended = declared in (None, "0") and not chunked
         wait = BODY_S if limit_bytes <= _SMALL else FILE_S
         self._deadline = asyncio.get_running_loop().time() + wait

@@ -28,7 +28,7 @@ from backend.api.errors import (
     words_of,
 )
 from backend.api.models import Problem
-from backend.api.security.body import BodyRefused, MeasuredBody, framing
+from backend.api.security.body import BodyRefused, MeasuredBody, framing, is_json
 from backend.api.security.origin import Addresses, header
 from backend.api.security.rights import Matched, Policy
 from backend.api.security.socket import GuardedSocket, OpenSockets
@@ -168,7 +168,13 @@ class Gate:
                 await self._admission.beginnings.turn()
             length, chunked = framing(scope["headers"])
             admitted = self._admit(scope)
-            body = MeasuredBody(receive, admitted.body_bytes, length, chunked)
+            body = MeasuredBody(
+                receive,
+                admitted.body_bytes,
+                length,
+                chunked,
+                is_json=is_json(scope["headers"]),
+            )
             body.require_accepted()
             with self._admission.running(_address(scope), known=admitted.known, stop=admitted.stop):
                 await self._run(scope, body, dressed, admitted.actor)

@@ -14,7 +14,7 @@ from backend.axis.stop.settings import OPTION, braking_option, known_settings
 from backend.drive.drive import Drive
 from drivers import cia402
 from drivers.cia402 import Mode, State
-from drivers.errors import DriveError
+from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
 from drivers.texts.message import Text, text
 
 if TYPE_CHECKING:
@@ -41,10 +41,7 @@ async def brake_then_quick_stop(power: PowerState) -> None:
             return
     elif known_settings(drive).halt_brakes and _seen_enabled(drive) and not power.quick_stop_out:
         # This word would enable an axis that is not enabled, or that is in a quick stop.
-        halt = cia402.ENABLE_OPERATION | cia402.HALT
-        await drive.stop_by(drive.require("control_word"), halt)
-        power.stop_step(StepCode.HALT)
-        halted = True
+        halted = await _halt(power)
     brakes = await _let_quick_stop_brake(power)
     if brakes or not halted:
         await power.send_quick_stop()
@@ -65,6 +62,25 @@ def torque_coasts(drive: Drive) -> bool:
         return False
     shown = _seen(drive, drive.key("mode_display"))
     return shown in (Mode.PT, Mode.CST) and _seen_enabled(drive)
+
+
+async def _halt(power: PowerState) -> bool:
+    """Send halt; False where the drive refuses it, so that a quick stop is needed all the same.
+
+    Raises:
+        DriveError: the drive is not reached.
+    """
+    problem: Text | None = None
+    drive = power.drive
+    try:
+        halt = cia402.ENABLE_OPERATION | cia402.HALT
+        await drive.stop_by(drive.require("control_word"), halt)
+    except (LinkLost, LinkTimeout, ProtocolError):
+        raise
+    except DriveError as error:
+        problem = error.text
+    power.stop_step(StepCode.HALT, problem)
+    return problem is None
 
 
 async def _take_speed_control(power: PowerState) -> bool:

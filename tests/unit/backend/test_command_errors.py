@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import io
 import json
+import os
+import re
 import signal
 import socket
 import sys
@@ -16,14 +19,14 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.commands import session
+from backend.commands import live, scales, session
 from backend.commands.serve import _print_problems
 from backend.commands.values import assignment, line, show_readings
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.station.bench import Bench
 from backend.station.records import REMOTE_S
-from drivers.errors import NotAllowed
+from drivers.errors import LinkLost, NotAllowed
 from drivers.texts.message import prose
 from profiles import load_profile
 from tests.support.machine import OwnTime
@@ -243,3 +246,64 @@ def test_values_come_as_json_and_with_their_unit() -> None:
     assert (shown[0]["value"], shown[0]["unit"], shown[0]["raw"]) == (150.0, "Hz", 1500)
     assert (shown[2]["value"], shown[2]["error"]) == (None, "no answer")
     assert line(status, read[1][1]) == "6041:00  Status word = 592 (0x0250)"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b'{"n":"\xff\xfe"}\n',
+        b'{"number":1e999,"previous":"","hash":"","body":"{}"}\n',
+        b'{"number":1,"previous":"","hash":"","body":"\\ud800"}\n',
+        b"[" * 100_000 + b"\n",
+    ],
+    ids=["not UTF-8", "infinite", "half a character", "deep"],
+)
+def test_a_file_that_is_no_audit_is_reported(tmp_path: Path, line: bytes) -> None:
+    file = tmp_path / "audit.jsonl"
+    file.write_bytes(line)
+    _refused("line 1 is not an entry", "audit", "verify", "--file", str(file))
+
+
+def test_numbers_that_are_none_are_reported(tmp_path: Path) -> None:
+    file = tmp_path / "audit.jsonl"
+    file.write_bytes(b"")
+    _refused("anchor", "audit", "verify", "--anchor", f"²:{'a' * 64}", "--file", str(file))
+    file = tmp_path / "drive.xml"
+    file.write_bytes(b'<?xml version="1.0"?><EtherCATInfo/>')
+    which = ("--product-code", "abc")
+    _refused("is not a number", "eeprom", "compare", "ethercat:eth9", str(file), *which)
+    _refused("--for-days", "health", "permit", "--axis", "x", "--for-days", "99999999", code=2)
+
+
+def _refused(words: str, *command: str, code: int = 1) -> None:
+    result = CliRunner().invoke(cli.app, list(command))
+    assert isinstance(result.exception, SystemExit), result.exception
+    assert result.exit_code == code
+    assert words in re.sub(r"\x1b\[[0-9;]*m", "", result.output)
+
+
+def test_a_slip_of_the_keyboard_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = iter(["half", "nan", "0,5"])
+    monkeypatch.setattr(typer, "prompt", lambda *_words, **_options: next(answers))
+    assert scales._turned(500) == 0.5
+    monkeypatch.setattr(typer, "prompt", lambda *_words, **_options: " ")
+    assert scales._turned(500) is None
+
+
+async def test_a_full_disk_is_not_blamed_on_the_connection(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Page:
+        async def __aenter__(self) -> Page:
+            return self
+
+        async def __aexit__(self, *_error: object) -> None: ...
+
+    async def greeting(*_arguments: object) -> None: ...
+
+    monkeypatch.setattr(live, "connect", lambda *_address, **_options: Page())
+    monkeypatch.setattr(live, "_next", greeting)
+    with pytest.raises(OSError, match="No space left"):
+        async with live._page("http://station"):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    with pytest.raises(LinkLost):
+        async with live._page("http://station"):
+            raise TimeoutError

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from backend.station.bench import Bench
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
 from backend.store.files import StorageFailed
+from drivers.errors import LinkLost
 from tests.support.memory_link import MemoryLink
 
 X = SavedDrive("X", "mms7", (SavedPort("mlink:///dev/ttyUSB0", 1),), "left", 77)
@@ -68,3 +70,77 @@ async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) 
         assert bench.connected_drives == {}
     finally:
         await bench.close()
+
+
+def _bench(folder: Path, *missing: str) -> Bench:
+    """A bench whose adapters are there, but for the missing ones."""
+
+    def link(place: str) -> MemoryLink:
+        found = MemoryLink({})
+        if place in missing:
+            found.open = _not_there  # type: ignore[method-assign]
+        return found
+
+    wires = {f"mlink://virtual{n}": partial(link, f"mlink://virtual{n}") for n in range(40)}
+    return Bench(folder, wires)  # type: ignore[arg-type]
+
+
+async def _not_there() -> None:
+    raise LinkLost("no such adapter")
+
+
+async def test_notes_and_serial_number_outlive_several_starts(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    here = SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77)
+    drives.store([here])
+    for _ in range(3):
+        bench = _bench(tmp_path)
+        await bench.restore()
+        connected = bench.connected("x")
+        assert connected.drive.notes == "left"
+        assert connected.drive.found is not None
+        assert connected.drive.found.serial == 77
+        assert drives.load() == ([here], [])
+        await bench.close()
+
+
+async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    both = SavedPort("mlink://virtual2", 4)
+    saved = [
+        SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77),
+        SavedDrive("Y", "mms7", (SavedPort("mlink://virtual1", 1), both), "right", 78),
+    ]
+    drives.store(saved)
+    bench = _bench(tmp_path, "mlink://virtual0", "mlink://virtual2")
+    await bench.restore()
+    assert list(bench.connected_drives) == ["y"]
+    found = bench.connected("y").drive.found
+    assert found is not None
+    assert found.serial == 78, "another drive at this place is still noticed"
+    bench.rename("y", None, "far right")
+    await bench.close()
+    loaded, _ = drives.load()
+    assert sorted(loaded, key=lambda each: each.name) == [
+        saved[0], SavedDrive("Y", "mms7", saved[1].ports, "far right", 78),
+    ]  # fmt: skip
+    # The next start has all of them; a drive that takes the place of a missing one replaces it.
+    bench = _bench(tmp_path, "mlink://virtual0")
+    await bench.restore()
+    assert [len(m.drive.ports) for m in bench.connected_drives.values()] == [2]
+    bench.buses.wires["mlink://virtual0"] = lambda: MemoryLink({})  # type: ignore[assignment,return-value]
+    await bench.connect("mlink://virtual0", 1, "mms7", "Z")
+    await bench.close()
+    assert sorted(each.name for each in drives.load()[0]) == ["Y", "Z"]
+
+
+async def test_a_bench_may_have_many_drives(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    drives.store(
+        SavedDrive(f"X{n}", "mms7", (SavedPort(f"mlink://virtual{n}", 1),), serial=n + 1)
+        for n in range(40)
+    )
+    bench = _bench(tmp_path)
+    await bench.restore()
+    assert len(bench.connected_drives) == 40
+    await bench.close()

@@ -221,3 +221,33 @@ def overheated(servo: Servo) -> None:
 
 def faults_logged(x: ConnectedDrive) -> int:
     return sum(entry.message.code == "station.fault" for entry in x.monitor._journal.entries())
+
+
+async def test_a_state_that_cannot_be_formed_is_not_shown_as_the_present_one(
+    x: ConnectedDrive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await x.monitor.refresh()
+    assert x.monitor.snapshot.fresh
+    sent: list[watching.Snapshot] = []
+    told = asyncio.Event()
+
+    def changed(snapshot: watching.Snapshot) -> None:
+        sent.append(snapshot)
+        told.set()
+        raise KeyError("and so does what listens")
+
+    def broken(*_arguments: object) -> None:
+        raise ValueError("a defect")
+
+    monkeypatch.setattr(x.monitor, "_changed", changed)
+    monkeypatch.setattr(watching, "active_faults", broken)
+    x.monitor.start()
+    async with asyncio.timeout(10):
+        await told.wait()
+        told.clear()
+        x.monitor.hurry()
+        await told.wait()
+    await x.monitor.close()
+    assert [snapshot.fresh for snapshot in sent] == [False, False]
+    assert sent[0].problem is not None
+    assert "a defect" in sent[0].problem.words()

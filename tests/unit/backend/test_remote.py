@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 
+import httpx
 import numpy as np
 import pytest
 
@@ -11,9 +13,11 @@ from backend.api.live.messages import ScopeChannelInfo, ScopeInfo
 from backend.api.live.scope_blocks import encode_block
 from backend.commands.live import Recording
 from backend.commands.options import DEFAULT_SERVER, server_for
+from backend.commands.remote import Remote
 from backend.commands.samples import Samples, decode
 from drivers.errors import OutOfRange, ProtocolError
 from drivers.link import ScopeBlock
+from drivers.texts.message import prose
 
 
 @pytest.mark.parametrize(
@@ -75,3 +79,35 @@ def test_samples_of_one_moment_make_one_row_whatever_comes_first() -> None:
         "0.002000,,9",
     ]
     assert (recorded.rows, recorded.dropped) == (3, 4)
+
+
+async def test_a_job_that_was_only_just_started_is_cancelled_with_the_command() -> None:
+    asked: list[tuple[str, str]] = []
+    begun, going_on = asyncio.Event(), asyncio.Event()
+
+    async def answer(request: httpx.Request) -> httpx.Response:
+        asked.append((request.method, request.url.path))
+        if request.method == "DELETE":
+            return httpx.Response(204)
+        begun.set()
+        # The axis moves already while the answer is on its way.
+        await going_on.wait()
+        job = {
+            "id": "jog-1", "kind": "jog", "drive": "x", "title": "Jog", "state": "running",
+            "title_message": prose("Jog").to_wire(), "progress": 0.0, "step": "",
+            "step_message": prose("").to_wire(), "started": "2026-01-01T00:00:00Z",
+            "ended": None, "motion": True, "result": None, "problem": None,
+        }  # fmt: skip
+        return httpx.Response(200, json=job)
+
+    async with httpx.AsyncClient(
+        transport=httpx.MockTransport(answer), base_url="http://station"
+    ) as http:
+        work = asyncio.create_task(Remote("http://station", http).result("/jobs/jog", {}))
+        await begun.wait()
+        work.cancel()
+        await asyncio.sleep(0)
+        going_on.set()
+        with pytest.raises(asyncio.CancelledError):
+            await work
+    assert asked == [("POST", "/jobs/jog"), ("DELETE", "/jobs/jog-1")]

@@ -12,11 +12,13 @@ import httpx
 import pytest
 
 from backend.axis.axis import Envelope
+from backend.axis.stop.facts import StepCode
 from backend.motion.grant import NotGranted
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.work.jobs import Progress
 from drivers.cia402 import Mode
+from drivers.errors import Rejected
 from drivers.texts.message import text
 from tests.support.servo import MODE, POSITION, STATUS, TARGET, VELOCITY_TARGET, Servo
 
@@ -168,3 +170,42 @@ async def test_a_motion_that_is_asked_for_after_stop_begins(
     assert not bench.connected("x").axis.stopped
     await bench.jobs.close()
     assert POSITION in servo.objects
+
+
+async def test_a_drive_that_refuses_halt_gets_its_quick_stop(
+    x: ConnectedDrive, servo: Servo
+) -> None:
+    servo.enable()
+    servo.set(OPTION, 0)
+    await x.drive.read("605A:00")
+    await x.axis.state()
+    refused = Rejected("refused", abort_code=0x06090030)
+    servo.write_errors.append(refused)
+    await x.axis.stop()
+    assert servo.words()[-1] == QUICK_STOP
+    assert not x.axis.stop_pending
+    steps = {step.code: step.done for step in x.axis.stop_steps}
+    assert not steps[StepCode.HALT]
+    assert steps[StepCode.QUICK_STOP]
+
+
+async def test_a_defect_at_one_axis_does_not_hide_the_stop_of_another(
+    bench: Bench, x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = Servo()
+    bench.buses.wires["mlink://virtual1"] = lambda: other
+    y = await bench.connect("mlink://virtual1", 1, "mms7", "Y")
+    await y.monitor.close()
+    other.enable()
+
+    async def broken() -> None:
+        raise ValueError("a defect")
+
+    monkeypatch.setattr(x.axis, "stop", broken)
+    problems = await bench.motion.stop([x.drive.id, y.drive.id])
+    assert "a defect" in str(problems[x.drive.id])
+    assert problems[y.drive.id] is None
+    assert other.words() == [QUICK_STOP]
+    monkeypatch.setattr(x.axis, "let_go", broken)
+    await bench.motion.let_go_of_all()
+    assert x.axis.stop_pending

@@ -171,3 +171,28 @@ def test_samples_of_one_stream_with_the_same_time_are_all_kept(tmp_path: Path) -
     seen = {(float(row[1]), float(row[2])) for row in rows}
     assert seen == {tuple(r) for r in np.concatenate([block(0).samples, late.samples]).tolist()}
     assert [float(row[0]) for row in rows] == sorted(float(row[0]) for row in rows)
+
+
+def test_many_samples_at_one_time_are_all_kept(tmp_path: Path) -> None:
+    path = tmp_path / "a.sdrec"
+    writer = RecordingWriter(path, header(2, 2), fail)
+    many = np.arange(80.0).reshape(40, 2)
+    writer.put(0, ScopeBlock(1, 100.0, 0.0, ("a", "b"), many))
+    writer.put(1, block(0))
+    writer.close({"reason": "stopped"})
+    with run(path, "csv").open(newline="", encoding="utf-8") as file:
+        _, *rows = list(csv.reader(file))
+    assert [(float(row[1]), float(row[2])) for row in rows if row[1]] == list(map(tuple, many))
+    assert sum(1 for row in rows if row[3]) == 10
+
+
+def test_a_signal_that_is_polled_slowly(tmp_path: Path) -> None:
+    path = tmp_path / "a.sdrec"
+    writer = RecordingWriter(path, header(2, 1), fail)
+    times = np.array([100.0, 103.5, 107.0])
+    values = np.arange(6.0).reshape(3, 2)
+    writer.put(0, ScopeBlock(1, 100.0, 3.5, ("a", "b"), values, times_s=times))
+    writer.close({"reason": "stopped"})
+    with run(path, "csv").open(newline="", encoding="utf-8") as file:
+        _, *rows = list(csv.reader(file))
+    assert [float(row[0]) for row in rows] == [0.0, 3.5, 7.0]
