@@ -16,20 +16,20 @@ TEXTS: dict[str, tuple[str, str]] = {
     "help": (
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",
-        "对闭合的保持抱闸双向加转矩，直至测试转矩或打滑。轴会通电。",
+        "在抱闸抱紧时双向施加转矩，直至达到测试转矩或打滑。轴会得电。",
     ),
     "lead": (
         "The axis is energised while its holding brake stays closed, and the torque rises to the "
         "test torque, forwards and then backwards. Where the shaft moves by the slip limit, the "
         "torque is removed in the next cycle.",
-        "保持抱闸闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
+        "抱闸始终抱紧，轴得电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
         "在下一个周期撤去转矩。",
     ),
     "danger": (
         "DANGER. A hanging load falls where its brake slips: support it so that it can neither "
         "fall nor be lifted off its support, and let nobody be below it or within its reach.",
         "危险。抱闸打滑时悬挂负载会坠落：请将负载支撑牢固，使其既不能坠落也不会被抬离支撑，"
-        "其下方及可及范围内不得有人。",
+        "其下方及运动范围内不得有人。",
     ),
     "warning": (
         "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. While "
@@ -44,12 +44,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "step.clear": (
         "2. Clear the danger zone, and keep STOP within reach.",
-        "2. 清空危险区域，并确保停止按钮触手可及。",
+        "2. 清空危险区域，并确保“停止”按钮触手可及。",
     ),
     "step.state": (
         "3. State below what hangs at the axis, then start. Remove the support after a brake that "
         "held, and never after one that slipped.",
-        "3. 在下方声明轴上的悬挂情况，然后启动。抱闸保持后方可撤去支撑；打滑后切勿撤去。",
+        "3. 在下方声明轴上的悬挂情况，然后启动。抱闸能够保持时，测试后方可撤去支撑；"
+        "抱闸打滑时切勿撤去。",
     ),
     "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
     "start": ("Test the brake", "测试抱闸"),
@@ -64,7 +65,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.nothing_hangs": (
         "No load pulls at this axis, whether its brake holds or not",
-        "无论抱闸是否保持，都没有负载拉动此轴",
+        "无论抱闸是否抱紧，此轴上都没有重力负载",
     ),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
@@ -126,7 +127,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "obstacle.no_torque_mode": (
         "The drive takes no torque with every cycle over this bus (cyclic synchronous torque).",
-        "该驱动器在此总线上不能逐周期接收转矩（循环同步转矩模式）。",
+        "该驱动器在此总线上不能逐周期接收转矩（周期同步转矩模式，CST）。",
     ),
     "obstacle.windup_beyond_limit": (
         "The shaft twisted elastically by the slip limit, without any slip. Raise the slip limit, "
@@ -139,7 +140,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "torque_short": (
         "The drive reached only {value} % of the motor's rated torque: look at its torque limits.",
-        "驱动器仅达到电机额定转矩的 {value} %：请检查其转矩限制。",
+        "驱动器仅达到电机额定转矩的 {value} %：请检查其转矩限值。",
     ),
     "by.output": (
         "The brake was kept closed by its output, which had another function meanwhile.",
