@@ -44,7 +44,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "step.clear": (
         "2. Clear the danger zone, and keep STOP within reach.",
-        "2. 清空危险区域，并确保“停止”按钮触手可及。",
+        "2. 使所有人离开危险区域，并确保“停止”按钮触手可及。",
     ),
     "step.state": (
         "3. State below what hangs at the axis, then start. Remove the support after a brake that "
@@ -65,7 +65,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.nothing_hangs": (
         "No load pulls at this axis, whether its brake holds or not",
-        "无论抱闸是否抱紧，此轴上都没有重力负载",
+        "无论抱闸是否抱紧，都没有负载对此轴施力（如重力、弹簧力）",
     ),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
@@ -83,23 +83,23 @@ TEXTS: dict[str, tuple[str, str]] = {
     "verdict.not_closed": (
         "The brake is not closed, or holds less than {value} % of the motor's rated torque. "
         "Secure the load; then look at the brake's wiring and at its output.",
-        "抱闸未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
+        "抱闸未抱紧，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
         "然后检查抱闸接线及其输出。",
     ),
     "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试抱闸。"),
     "obstacle.means_unknown": (
         "Nothing is known of how this drive could keep its brake closed while it is enabled. "
         "Disconnect the brake's supply, state that, and start again.",
-        "不知道该驱动器在使能时如何保持抱闸闭合。请断开抱闸电源并声明，然后重新开始。",
+        "不知道该驱动器在使能时如何使抱闸保持抱紧。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.built_in": (
         "The brake inside the motor opens with the power stage; the manual prints no other way.",
-        "电机内置抱闸随功率级打开；手册未给出其他方式。",
+        "电机内置抱闸随功率级得电而松开；手册未给出其他方式。",
     ),
     "obstacle.fixed_output": (
         "The drive's output for the brake opens it when the axis is enabled, and cannot be given "
         "another function. Disconnect the brake's supply, state that, and start again.",
-        "轴使能时驱动器的抱闸输出会打开抱闸，且无法改为其他功能。请断开抱闸电源并声明，"
+        "轴使能时驱动器的抱闸输出会松开抱闸，且无法改为其他功能。请断开抱闸电源并声明，"
         "然后重新开始。",
     ),
     "obstacle.bus_bit": (
@@ -118,7 +118,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "obstacle.output_inverted": (
         "The brake's output has inverted logic, so that another function might open the brake. "
         "Disconnect the brake's supply, state that, and start again.",
-        "抱闸输出为反逻辑，改为其他功能可能会打开抱闸。请断开抱闸电源并声明，然后重新开始。",
+        "抱闸输出为反逻辑，改为其他功能可能会松开抱闸。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.output_forced": (
         "60FEh would switch the brake's output on as soon as it has another function. Release the "
@@ -144,7 +144,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "by.output": (
         "The brake was kept closed by its output, which had another function meanwhile.",
-        "抱闸由其输出保持闭合，该输出在测试期间改为其他功能。",
+        "抱闸由其输出保持抱紧，该输出在测试期间改为其他功能。",
     ),
     "by.supply": (
         "Somebody stated that the brake's supply was disconnected.",

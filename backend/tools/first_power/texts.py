@@ -29,7 +29,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "DANGER. The holding brake opens and nothing holds the axis: a hanging load falls. Support "
         "it so that it can neither fall nor be lifted off its support, and let nobody be below it "
         "or within its reach.",
-        "危险。抱闸打开后，没有任何力保持该轴：悬挂负载会坠落。请将负载支撑牢固，"
+        "危险。抱闸松开后，没有任何力保持该轴：悬挂负载会坠落。请将负载支撑牢固，"
         "使其既不能坠落也不会被抬离支撑，其下方及运动范围内不得有人。",
     ),
     "warning": (
@@ -51,7 +51,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.powered": ("Energise the motor", "给电机通电"),
     "field.pole_pairs": ("Pole pairs of the motor", "电机极对数"),
-    "field.nothing_hangs": ("No load pulls at this axis", "此轴上没有重力负载"),
+    "field.nothing_hangs": ("No load pulls at this axis", "没有负载对此轴施力（如重力、弹簧力）"),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
         "悬挂负载已支撑，且其下方无人",
@@ -149,7 +149,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "brake.not_seen": (
         "Brake: the shaft did not move. Listen whether the brake opens.",
-        "抱闸：轴未移动。请听抱闸是否打开。",
+        "抱闸：轴未移动。请听抱闸是否松开。",
     ),
     "brake.not_done": ("Brake: not energised.", "抱闸：未通电。"),
     "phases.right": (
@@ -194,19 +194,19 @@ TEXTS: dict[str, tuple[str, str]] = {
     "phases.blocked": (
         "Phases: the shaft went its way in one direction only. Something blocks it on one side, or "
         "a load pulls at it: move it away from there and repeat.",
-        "相序：轴仅在一个方向移动。一侧受阻或有负载拉动：请移开后重试。",
+        "相序：轴仅在一个方向移动。一侧受阻或有负载施力：请移开后重试。",
     ),
     "phases.pulled": (
         "Phases: the shaft went the same way for both signs of the torque: a load pulls at it. "
         "Support the load and repeat.",
-        "相序：转矩正负时轴均朝同一方向移动：有负载拉动。请支撑负载后重试。",
+        "相序：转矩正负时轴均朝同一方向移动：有负载对轴施力。请支撑负载后重试。",
     ),
     "phases.no_motion": (
         "Phases: the strongest permitted pulse moved nothing. The brake is closed, something "
         "blocks the shaft, friction is higher, a phase is open, or two phases are exchanged and "
         "the rotor stands where they make no torque: turn it by hand by a sixteenth of a "
         "revolution and repeat.",
-        "相序：允许的最大脉冲未使轴移动。抱闸闭合、轴受阻、摩擦过大、缺相，"
+        "相序：允许的最大脉冲未使轴移动。抱闸抱紧、轴受阻、摩擦过大、缺相，"
         "或两相接反且转子恰处于无转矩位置：请用手转动 1/16 圈后重试。",
     ),
     "phases.short": (

@@ -52,7 +52,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "field.torque_free_limit_ms": ("Torque gone within (ms)", "转矩消失时限 (ms)"),
     "field.stop_limit_ms": ("Standstill within (ms)", "静止时限 (ms)"),
     "field.stop_limit_rev": ("Standstill within (revolutions)", "到静止的行程限值（圈）"),
-    "field.nothing_hangs": ("No load pulls at this axis", "此轴上没有重力负载"),
+    "field.nothing_hangs": ("No load pulls at this axis", "没有负载对此轴施力（如重力、弹簧力）"),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
         "悬挂负载已支撑，且其下方无人",
