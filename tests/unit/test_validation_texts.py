@@ -139,9 +139,9 @@ def test_a_missing_field_and_an_unknown_kind_are_named() -> None:
 
 def test_the_limit_is_a_typed_fact() -> None:
     assert reason_of(_first(_Limits, {"count": 0})) == Text(
-        "input.greater-than-equal", {"limit": 1}
+        "input.greater-than-equal", {"bound": 1}
     )
-    assert reason_of(_first(_Limits, {"speed": 0})) == Text("input.greater-than", {"limit": 0})
+    assert reason_of(_first(_Limits, {"speed": 0})) == Text("input.greater-than", {"bound": 0})
 
 
 def test_the_reason_of_an_own_validator_is_its_message() -> None:

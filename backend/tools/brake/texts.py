@@ -17,20 +17,20 @@ TEXTS: dict[str, tuple[str, str]] = {
     "help": (
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",
-        "对闭合的保持抱闸双向加转矩，直至测试转矩或打滑。轴会通电。",
+        "在抱闸抱紧时双向施加转矩，直至达到测试转矩或打滑。轴会得电。",
     ),
     "lead": (
         "The axis is energised while its holding brake stays closed, and the torque rises to the "
         "test torque, forwards and then backwards. Where the shaft moves by the slip limit, the "
         "torque is removed in the next cycle.",
-        "保持抱闸闭合时给轴通电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
+        "抱闸始终抱紧，轴得电，转矩先正向后反向升至测试转矩。轴移动达到打滑限值时，"
         "在下一个周期撤去转矩。",
     ),
     "danger": (
         "DANGER. A hanging load falls where its brake slips: support it so that it can neither "
         "fall nor be lifted off its support, and let nobody be below it or within its reach.",
         "危险。抱闸打滑时悬挂负载会坠落：请将负载支撑牢固，使其既不能坠落也不会被抬离支撑，"
-        "其下方及可及范围内不得有人。",
+        "其下方及运动范围内不得有人。",
     ),
     "warning": (
         "WARNING. The shaft may turn suddenly. Keep away from everything that it drives. While "
@@ -45,12 +45,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "step.clear": (
         "2. Clear the danger zone, and keep STOP within reach.",
-        "2. 清空危险区域，并确保停止按钮触手可及。",
+        "2. 使所有人离开危险区域，并确保“停止”按钮触手可及。",
     ),
     "step.state": (
         "3. State below what hangs at the axis, then start. Remove the support after a brake that "
         "held, and never after one that slipped.",
-        "3. 在下方声明轴上的悬挂情况，然后启动。抱闸保持后方可撤去支撑；打滑后切勿撤去。",
+        "3. 在下方声明轴上的悬挂情况，然后启动。抱闸能够保持时，测试后方可撤去支撑；"
+        "抱闸打滑时切勿撤去。",
     ),
     "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
     "start": ("Test the brake", "测试抱闸"),
@@ -65,7 +66,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.nothing_hangs": (
         "No load pulls at this axis, whether its brake holds or not",
-        "无论抱闸是否保持，都没有负载拉动此轴",
+        "无论抱闸是否抱紧，都没有负载对此轴施力（如重力、弹簧力）",
     ),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
@@ -83,23 +84,23 @@ TEXTS: dict[str, tuple[str, str]] = {
     "verdict.not_closed": (
         "The brake is not closed, or holds less than {value} % of the motor's rated torque. "
         "Secure the load; then look at the brake's wiring and at its output.",
-        "抱闸未闭合，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
+        "抱闸未抱紧，或保持转矩低于电机额定转矩的 {value} %。请固定负载，"
         "然后检查抱闸接线及其输出。",
     ),
     "verdict.cannot_be_tested": ("The brake cannot be tested.", "无法测试抱闸。"),
     "obstacle.means_unknown": (
         "Nothing is known of how this drive could keep its brake closed while it is enabled. "
         "Disconnect the brake's supply, state that, and start again.",
-        "不知道该驱动器在使能时如何保持抱闸闭合。请断开抱闸电源并声明，然后重新开始。",
+        "不知道该驱动器在使能时如何使抱闸保持抱紧。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.built_in": (
         "The brake inside the motor opens with the power stage; the manual prints no other way.",
-        "电机内置抱闸随功率级打开；手册未给出其他方式。",
+        "电机内置抱闸随功率级得电而松开；手册未给出其他方式。",
     ),
     "obstacle.fixed_output": (
         "The drive's output for the brake opens it when the axis is enabled, and cannot be given "
         "another function. Disconnect the brake's supply, state that, and start again.",
-        "轴使能时驱动器的抱闸输出会打开抱闸，且无法改为其他功能。请断开抱闸电源并声明，"
+        "轴使能时驱动器的抱闸输出会松开抱闸，且无法改为其他功能。请断开抱闸电源并声明，"
         "然后重新开始。",
     ),
     "obstacle.bus_bit": (
@@ -118,7 +119,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "obstacle.output_inverted": (
         "The brake's output has inverted logic, so that another function might open the brake. "
         "Disconnect the brake's supply, state that, and start again.",
-        "抱闸输出为反逻辑，改为其他功能可能会打开抱闸。请断开抱闸电源并声明，然后重新开始。",
+        "抱闸输出为反逻辑，改为其他功能可能会松开抱闸。请断开抱闸电源并声明，然后重新开始。",
     ),
     "obstacle.output_forced": (
         "60FEh would switch the brake's output on as soon as it has another function. Release the "
@@ -127,7 +128,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "obstacle.no_torque_mode": (
         "The drive takes no torque with every cycle over this bus (cyclic synchronous torque).",
-        "该驱动器在此总线上不能逐周期接收转矩（循环同步转矩模式）。",
+        "该驱动器在此总线上不能逐周期接收转矩（周期同步转矩模式，CST）。",
     ),
     "obstacle.windup_beyond_limit": (
         "The shaft twisted elastically by the slip limit, without any slip. Raise the slip limit, "
@@ -140,11 +141,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "torque_short": (
         "The drive reached only {value} % of the motor's rated torque: look at its torque limits.",
-        "驱动器仅达到电机额定转矩的 {value} %：请检查其转矩限制。",
+        "驱动器仅达到电机额定转矩的 {value} %：请检查其转矩限值。",
     ),
     "by.output": (
         "The brake was kept closed by its output, which had another function meanwhile.",
-        "抱闸由其输出保持闭合，该输出在测试期间改为其他功能。",
+        "抱闸由其输出保持抱紧，该输出在测试期间改为其他功能。",
     ),
     "by.supply": (
         "Somebody stated that the brake's supply was disconnected.",

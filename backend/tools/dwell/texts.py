@@ -17,8 +17,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "The axis vibrates at the frequency, faded in and out, and the step of the job shows the "
         "amplitude at the motor meanwhile. Keep hands away from what moves; STOP ends it at any "
         "moment.",
-        "轴以该频率振动，渐入渐出，作业步骤实时显示电机处的幅值。请勿触碰运动部件；"
-        "STOP 可随时结束。",
+        "轴以该频率振动，渐入渐出，任务步骤实时显示电机处的幅值。请勿触碰运动部件；"
+        "按“停止”（STOP）可随时结束。",
     ),
     "start": ("Vibrate", "开始激振"),
     "field.frequency_hz": ("Frequency", "频率"),
@@ -77,7 +77,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "finding.blocks_lost": (
         "{value} {unit} of the samples did not come.",
-        "有 {value} {unit} 的样本未到达。",
+        "有 {value} {unit} 的采样未到达。",
     ),
     "finding.motor_side": (
         "All of this is seen from the motor: which part rattles is for hand and ear.",

@@ -23,14 +23,14 @@ TEXTS: dict[str, tuple[str, str]] = {
         "turn the shaft some degrees forwards and back; no loop is closed, and a stop takes the "
         "power off.",
         "用于尚未闭环运行过的电机的检查表。小转矩脉冲使轴正反各转动几度；不闭合任何控制环，"
-        "停止时直接断电。",
+        "停止时直接关断功率级。",
     ),
     "danger": (
         "DANGER. The holding brake opens and nothing holds the axis: a hanging load falls. Support "
         "it so that it can neither fall nor be lifted off its support, and let nobody be below it "
         "or within its reach.",
-        "危险。保持抱闸打开后没有任何力保持该轴：悬挂负载会坠落。请将负载支撑牢固，"
-        "使其既不能坠落也不会被抬离支撑，其下方及可及范围内不得有人。",
+        "危险。抱闸松开后，没有任何力保持该轴：悬挂负载会坠落。请将负载支撑牢固，"
+        "使其既不能坠落也不会被抬离支撑，其下方及运动范围内不得有人。",
     ),
     "warning": (
         "WARNING. The shaft may turn suddenly, in either direction. Keep away from everything that "
@@ -39,7 +39,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "state_first": (
         "State first what hangs at the axis, or leave the motor without power.",
-        "请先声明轴上的悬挂情况，或保持电机断电。",
+        "请先声明轴上的悬挂情况，或不给电机通电。",
     ),
     "start": ("Go through the checklist", "执行检查表"),
     "field.hand_turn": ("I turn the shaft by hand when asked", "我会在提示时用手转动轴"),
@@ -51,7 +51,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "field.powered": ("Energise the motor", "给电机通电"),
     "field.pole_pairs": ("Pole pairs of the motor", "电机极对数"),
-    "field.nothing_hangs": ("No load pulls at this axis", "没有负载拉动此轴"),
+    "field.nothing_hangs": ("No load pulls at this axis", "没有负载对此轴施力（如重力、弹簧力）"),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
         "悬挂负载已支撑，且其下方无人",
@@ -149,7 +149,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "brake.not_seen": (
         "Brake: the shaft did not move. Listen whether the brake opens.",
-        "抱闸：轴未移动。请听抱闸是否打开。",
+        "抱闸：轴未移动。请听抱闸是否松开。",
     ),
     "brake.not_done": ("Brake: not energised.", "抱闸：未通电。"),
     "phases.right": (
@@ -194,19 +194,19 @@ TEXTS: dict[str, tuple[str, str]] = {
     "phases.blocked": (
         "Phases: the shaft went its way in one direction only. Something blocks it on one side, or "
         "a load pulls at it: move it away from there and repeat.",
-        "相序：轴仅在一个方向移动。一侧受阻或有负载拉动：请移开后重试。",
+        "相序：轴仅在一个方向移动。一侧受阻或有负载施力：请移开后重试。",
     ),
     "phases.pulled": (
         "Phases: the shaft went the same way for both signs of the torque: a load pulls at it. "
         "Support the load and repeat.",
-        "相序：转矩正负时轴均朝同一方向移动：有负载拉动。请支撑负载后重试。",
+        "相序：转矩正负时轴均朝同一方向移动：有负载对轴施力。请支撑负载后重试。",
     ),
     "phases.no_motion": (
         "Phases: the strongest permitted pulse moved nothing. The brake is closed, something "
         "blocks the shaft, friction is higher, a phase is open, or two phases are exchanged and "
         "the rotor stands where they make no torque: turn it by hand by a sixteenth of a "
         "revolution and repeat.",
-        "相序：允许的最大脉冲未使轴移动。抱闸闭合、轴受阻、摩擦过大、缺相，"
+        "相序：允许的最大脉冲未使轴移动。抱闸抱紧、轴受阻、摩擦过大、缺相，"
         "或两相接反且转子恰处于无转矩位置：请用手转动 1/16 圈后重试。",
     ),
     "phases.short": (
@@ -219,7 +219,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "at the lowest speed with the drive's torque limit at 10 % and a hand on the emergency "
         "stop.",
         "相序：该驱动器在此总线上不能逐周期接收转矩（循环同步转矩模式），无法在不闭环的情况下运动。"
-        "未通电：请将驱动器转矩限制设为 10 %，手放在急停上，以最低速度点动。",
+        "未通电：请将驱动器转矩限值设为 10 %，手放在急停上，以最低速度点动。",
     ),
     "phases.counts_first": (
         "Phases: not energised, as the counts are wrong and travel would not be what it seems.",

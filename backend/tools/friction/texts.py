@@ -77,7 +77,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "finding.fastest_by_travel": (
         "The travel limit leaves no speed above {value} {unit}.",
-        "行程限制使速度不超过 {value} {unit}。",
+        "行程限值使速度不超过 {value} {unit}。",
     ),
     "finding.slowest_by_time": (
         "The time limit leaves no speed below {value} {unit}.",

@@ -18,14 +18,14 @@ TEXTS: dict[str, tuple[str, str]] = {
         "The axis runs at the test speed, and you trigger the safety function by hand. The trace "
         "is stored, with times and ways from the first sign of it on the bus. Each check is "
         "started by a person: after one nothing moves by itself.",
-        "轴以测试速度运行，由您手动触发安全功能。记录轨迹，以及从总线上首个征兆起的时间和行程。"
+        "轴以测试速度运行，由您手动触发安全功能。记录曲线，以及从总线上首个征兆起的时间和行程。"
         "每项检查都由人启动：检查之后轴不会自行运动。",
     ),
     "no_certificate": (
         "This is a record and no certificate: the values are what the drive reports over a bus "
         "that is not safety-rated. Validation to ISO 13849-2 or IEC 62061 remains with the "
         "machine's builder.",
-        "此为记录而非证书：数值是驱动器经由非安全总线报告的。"
+        "这是记录，不是证书：数值是驱动器经由非安全总线报告的。"
         "按 ISO 13849-2 或 IEC 62061 的确认仍由机器制造商负责。",
     ),
     "danger": (
@@ -37,7 +37,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "warning": (
         "WARNING. Expect that the function does not act: keep everybody out of the danger zone, "
         "and have a second way to stop the axis at hand.",
-        "警告。须预期该功能可能不起作用：请使所有人离开危险区域，并备好另一种停轴手段。",
+        "警告。请考虑到该功能可能不起作用：请使所有人离开危险区域，并备好另一种停轴手段。",
     ),
     "state_first": ("State first what hangs at the axis.", "请先声明轴上的悬挂情况。"),
     "name_first": ("Say first what you trigger it with.", "请先填写触发装置。"),
@@ -46,13 +46,13 @@ TEXTS: dict[str, tuple[str, str]] = {
     "field.device": ("Triggered with", "触发装置"),
     "field.person": ("Triggered by", "触发人"),
     "field.speed_rpm": ("Test speed (rpm)", "测试速度 (rpm)"),
-    "field.wait_s": ("Time to trigger it (s)", "触发时间 (s)"),
+    "field.wait_s": ("Time to trigger it (s)", "触发时限 (s)"),
     "field.watch_s": ("Time watched after it (s)", "之后观察的时间 (s)"),
     "field.limited_rpm": ("Speed limit (rpm)", "速度限值 (rpm)"),
     "field.torque_free_limit_ms": ("Torque gone within (ms)", "转矩消失时限 (ms)"),
-    "field.stop_limit_ms": ("Standstill within (ms)", "停止时限 (ms)"),
-    "field.stop_limit_rev": ("Standstill within (revolutions)", "停止行程限值（圈）"),
-    "field.nothing_hangs": ("No load pulls at this axis", "没有负载拉动此轴"),
+    "field.stop_limit_ms": ("Standstill within (ms)", "静止时限 (ms)"),
+    "field.stop_limit_rev": ("Standstill within (revolutions)", "到静止的行程限值（圈）"),
+    "field.nothing_hangs": ("No load pulls at this axis", "没有负载对此轴施力（如重力、弹簧力）"),
     "field.load_supported": (
         "The hanging load is supported and nobody is below it",
         "悬挂负载已支撑，且其下方无人",
@@ -118,7 +118,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "obstacle.torque_in_noise": (
         "The torque before the trigger ({value} %) is not above what the drive reports without "
         "power, so that its end cannot be seen. Trigger it at a higher speed or with a load.",
-        "触发前的转矩（{value} %）不高于驱动器无动力时的报告值，因此无法看出其消失。"
+        "触发前的转矩（{value} %）不高于驱动器未得电时的报告值，因此无法看出其消失。"
         "请在更高速度或带负载时触发。",
     ),
     "obstacle.too_slow": (
@@ -140,7 +140,7 @@ TEXTS: dict[str, tuple[str, str]] = {
         "The drive braked in its state Quick stop active, and the exchange of this program then "
         "took its power away, as it does with every axis that leaves Operation enabled. SS1 of "
         "this drive is not shown here: record it under the machine's controller.",
-        "驱动器在“快速停止有效（Quick stop active）”状态下制动，随后本程序的周期通信使其断电"
+        "驱动器在“快速停止有效（Quick stop active）”状态下制动，随后本程序的周期通信关断其功率级"
         "（对每个离开“运行使能（Operation enabled）”的轴都如此）。"
         "此处无法证实该驱动器的 SS1：请在机器控制器下记录。",
     ),
@@ -182,8 +182,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "torque_free": ("Time until the torque was gone", "转矩消失的时间"),
     "torque_after": ("Greatest torque after that", "之后的最大转矩"),
     "speed_at_free": ("Speed when the torque was gone", "转矩消失时的速度"),
-    "stop_time": ("Time to standstill", "到停止的时间"),
-    "stop_distance": ("Way to standstill", "到停止的行程"),
+    "stop_time": ("Time to standstill", "到静止的时间"),
+    "stop_distance": ("Way to standstill", "到静止的行程"),
     "highest": ("Highest speed", "最高速度"),
     "limited": ("Speed limit", "速度限值"),
     "watched": ("Time watched", "观察时间"),

@@ -41,7 +41,7 @@ TEXTS: dict[str, tuple[str, str]] = {
     "no_resonance": ("No resonance was found in the valid band.", "有效频段内未发现谐振。"),
     "untrusted": (
         "No mechanical model explains this recording; nothing may be designed from it.",
-        "没有机械模型能解释该记录；不可据此设计。",
+        "没有机械模型能解释该录制；不可据此设计。",
     ),
     "kind": ("Kind", "类型"),
     "resonance": ("resonance", "谐振"),

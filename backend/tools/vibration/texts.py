@@ -101,11 +101,11 @@ TEXTS: dict[str, tuple[str, str]] = {
     ),
     "finding.fastest_by_travel": (
         "The travel limit leaves no speed above {value} {unit}.",
-        "行程限制使速度不超过 {value} {unit}。",
+        "行程限值使速度不超过 {value} {unit}。",
     ),
     "finding.samples_lost": (
         "{value} plateaus lost too many samples and are left out.",
-        "有 {value} 段恒速因丢失过多样本而未计入。",
+        "有 {value} 段恒速因丢失过多采样而未计入。",
     ),
     "finding.band": (
         "Nothing above {value} {unit} is stated: the samples of the bus do not show it, or fold it "

@@ -96,7 +96,7 @@ async def server_ends(bench: Bench, _hub: LiveHub, _job: Job) -> None:
 CAUSES: list[tuple[Ending, str, str, str]] = [
     (silent, "work.page-not-reachable", "was not reachable for 2 s", "2 s 无法连通"),
     (gone, "work.page-gone", "closed or lost its connection", "已关闭或断开连接"),
-    (stopped, "motion.stop-was-pressed", "STOP was pressed", "已按下 STOP"),
+    (stopped, "motion.stop-was-pressed", "STOP was pressed", "已按下“停止”（STOP）"),
     (taken, "work.control-taken", "Boris took control", "Boris 接管"),
     (session_over, "motion.session-is-over", "session", "会话已结束"),
     (role_lowered, "motion.account-has-another-role", "role", "角色已更改"),

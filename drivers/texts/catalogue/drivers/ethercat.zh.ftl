@@ -91,7 +91,7 @@ ethercat_eeprom-drive-silent = 驱动器没有给出自己的标识（1018h）
 ethercat_eeprom-drive-unknown = 固件和 EEPROM 都没有说明这是哪种驱动器
     .remedy = 请查看铭牌；若文件确属该驱动器，请再作确认
 ethercat_eeprom-emulated = EEPROM 由驱动器自身的处理器模拟（0502h 位 5）：中断的更改无法通过总线修复
-    .remedy = 请使用厂商的工具
+    .remedy = 请使用厂家的工具
 ethercat_eeprom-file-size = 文件为 { $bytes } 字节，驱动器的 EEPROM 为 { $size } 字节
     .remedy = 请选择从该驱动器保存的文件
 ethercat_eeprom-file-unsound = 该文件不是完好的 EEPROM 备份：{ $cause }
@@ -280,7 +280,7 @@ ethercat_station-not-take-process-data = 站 { $station } 不接受这些过程�
 ethercat_station-not-take-watchdog = 从站 { $station } 不接受其文件中的看门狗分频值 { $watchdog_divider }
     .remedy = 拒绝周期模式运动：计算机失效时没有任何措施使轴停止
 ethercat_station-refuses-al-status = 站 { $station } 拒绝 { $target }，处于 { $state_name }：{ $status }（AL 状态 { NUM($al_code, format: "#06x") }）
-ethercat_station-refuses-command-maker = 从站 { $station } 拒绝其厂商文件中的命令 { $transition } { NUM($command_index, format: "04X") }:{ NUM($subindex, format: "02X") } = { $value }：{ $cause }
+ethercat_station-refuses-command-maker = 从站 { $station } 拒绝其厂家文件中的命令 { $transition } { NUM($command_index, format: "04X") }:{ NUM($subindex, format: "02X") } = { $value }：{ $cause }
     .remedy = 导入正是该版本的文件，或在配置文件的 bring_up.init_commands 中去掉该命令
 ethercat_station-still-after-requested = 站 { $station } 在 { NUM($limit_s, format: "g") } s 后仍处于 { $state_name }，请求的是 { $target }
     .remedy = 驱动器可能仍在启动：请重试

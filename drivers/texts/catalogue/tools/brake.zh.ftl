@@ -1,12 +1,12 @@
 brake_backwards = 反向
-brake_enabled-already = { $drive } 已使能：只有在电机断电时才能更改其抱闸输出的功能
+brake_enabled-already = { $drive } 已使能：只有在电机未得电时才能更改其抱闸输出的功能
     .remedy = 请先断使能该轴
 brake_evaluating = 正在计算
 brake_forwards = 正向
 brake_rated-torque-not-known = { $drive } 未提供额定转矩，因此无法换算以 N·m 给出的测试转矩
     .remedy = 请给出电机额定转矩，或以其百分比给出测试转矩
 brake_say-what-hangs = { $drive }：警告：抱闸打滑时悬挂的负载会坠落，而尚未声明此轴上是否悬挂负载
-    .remedy = 请支撑悬挂负载并声明（load_supported），或声明没有负载拉动该轴（nothing_hangs）
+    .remedy = 请支撑悬挂负载并声明（load_supported），或声明没有负载对该轴施力，如重力或弹簧力（nothing_hangs）
 brake_torque-not-permitted = { $drive }：测试转矩为额定转矩的 { NUM($percent, format: ".3g") } %，需要 { NUM($needed, format: ".3g") } % 的转矩限值，因为实际转矩会在其附近波动
     .remedy = 若电机和机器允许，请提高转矩限值，或以较小转矩测试
 brake_title = 抱闸测试

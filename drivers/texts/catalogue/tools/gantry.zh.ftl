@@ -6,6 +6,6 @@ gantry_no-partner = { $drive }：龙门需要两个轴一起测量，但未指�
     .remedy = 请指定另一轴（--partner）
 gantry_no-room = 行程和速度限值过小，无法进行带激励的基础运动
     .remedy = 请允许更大的行程或更高的速度，或选择更大的谱线间隔
-gantry_no-time = 运动需要 { NUM($takes_s, format: ".3g") } s，超过时间限制
+gantry_no-time = 运动需要 { NUM($takes_s, format: ".3g") } s，超过时间限值
     .remedy = 请允许更长时间，或更大的谱线间隔
 gantry_title = 龙门

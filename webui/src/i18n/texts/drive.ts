@@ -63,7 +63,7 @@ export const drive = {
   'problemTitle.busy': ['In use', '正在使用'],
   'problemTitle.bad-description': ['Not a usable description', '描述文件不可用'],
   'problemTitle.bad-parameter-set': ['Not a usable parameter set', '参数集不可用'],
-  'problemTitle.bad-recording': ['Not a usable recording', '记录不可用'],
+  'problemTitle.bad-recording': ['Not a usable recording', '录制不可用'],
   'problemTitle.bad-snapshot': ['Not a usable snapshot', '快照不可用'],
   'problemTitle.storage-failed': ['Could not be stored', '无法存储'],
   'problemTitle.restore-failed': ['Not everything was restored', '未能全部恢复'],

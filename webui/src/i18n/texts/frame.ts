@@ -2,7 +2,7 @@ import type { Texts } from '../types'
 
 /** Frame, states, and words used everywhere. */
 export const frame = {
-  'stop.byOther': ['{person} pressed STOP.', '{person} 按下了停止。'],
+  'stop.byOther': ['{person} pressed STOP.', '{person} 按下了“停止”。'],
   'stop.somebody': ['Somebody', '有人'],
   'stop.askFirst': [
     'All axes were stopped. Ask why before you move anything again.',
@@ -24,7 +24,7 @@ export const frame = {
   'stop.taken': ['Quick stop sent. Verifying standstill…', '已发送快速停止，正在确认各轴是否静止…'],
   'stop.coasting': [
     '{name} has no power and coasts, {speed}.',
-    '{name} 已断电，正以 {speed} 自由停车。',
+    '{name} 的功率级已关断，正在自由停车，{speed}。',
   ],
   'stop.still_moving': ['{name} is still moving at {speed}.', '{name} 仍在运动，{speed}！'],
   'stop.keepAway': ['Keep clear until it is at standstill.', '静止之前请勿靠近。'],
@@ -46,7 +46,7 @@ export const frame = {
     '已清除驱动器自身运动的触发',
   ],
   'stop.step.brake_applied': ['holding brake applied', '抱闸已抱紧'],
-  'stop.step.voltage_disabled': ['power switched off', '已断电'],
+  'stop.step.voltage_disabled': ['power switched off', '功率级已关断'],
   'stop.step.process_data_ended': [
     "process data ended, so that the drive's watchdog trips",
     '已结束过程数据，使驱动器看门狗动作',
@@ -57,7 +57,7 @@ export const frame = {
   ],
   'turning.disabled.help': [
     'It may be moved by hand, by gravity, or by the drive itself.',
-    '可能原因：手动转动、重力，或驱动器自行运动。',
+    '可能是人手转动、重力作用，或驱动器自行运动。',
   ],
   'turning.without_grant': [
     '{name} is enabled and turns at {speed}, although no motion was started here.',
@@ -82,7 +82,7 @@ export const frame = {
   'broken.title': ['This page failed.', '此页面出错。'],
   'broken.text': [
     'STOP still works. Choose another page, or load this one again.',
-    '停止按钮仍然有效。请选择其他页面或重新加载。',
+    '“停止”按钮仍然有效。请选择其他页面或重新加载。',
   ],
   'frame.skip': ['Skip to content', '跳到内容'],
   'frame.times': ['Times in {zone}', '时间按 {zone} 时区'],

@@ -66,14 +66,14 @@ export const functions = {
   'io.force.end': ['End and restore', '结束并恢复'],
   'io.force.agree': [
     'I understand. Nobody is near the parts that these terminals move.',
-    '我已了解，相关机构附近无人。',
+    '我已了解。这些端子所驱动的机构附近无人。',
   ],
   'io.force.own': ['as it is', '实际值'],
   'io.force.on': ['on', '通'],
   'io.force.off': ['off', '断'],
   'io.force.running': [
     'Terminals are forced. They are restored when you end this, leave the page, lose the connection or press STOP.',
-    '端子正被强制。结束、离开页面、断开连接或按停止时会恢复。',
+    '端子正被强制。结束、离开页面、断开连接或按“停止”时会恢复。',
   ],
   'io.force.other': ['Somebody is forcing terminals of this axis.', '有人正在强制此轴的端子。'],
   'io.force.value': ['Value of {name}', '{name} 的值'],
@@ -196,7 +196,7 @@ export const functions = {
   'gear.by.teeth': ['by teeth', '按齿数'],
   'gear.by.module': ['by module', '按模数'],
   'gear.by.pitch': ['by pitch', '按齿距'],
-  'gear.motorTurns': ['Gearbox: motor turns', '减速箱：电机转数'],
+  'gear.motorTurns': ['Gearbox: motor turns', '减速机：电机转数'],
   'gear.loadTurns': ['to load turns', '对应负载转数'],
   'gear.resolution': ['One increment is', '一个增量为'],
   'gear.plan': ['Calculate', '计算'],
@@ -219,7 +219,7 @@ export const functions = {
   ],
   'gear.confirm': [
     'WARNING: this changes the meaning of the positions, limits and speeds of this axis. Home it again before any move to an absolute position.',
-    '警告：此后该轴的位置、限位和速度含义都会改变。按绝对位置运动前请重新回零。',
+    '警告：此操作会改变该轴的位置、限值和速度的含义。向绝对位置运动之前，请重新回零。',
   ],
   'gear.written': ['The gear is written.', '齿轮比已写入。'],
   'gear.waits': ['Pending until: {what}', '等待：{what}'],
@@ -246,7 +246,7 @@ export const functions = {
   'brake.outputIs': ['Brake output: {name}', '抱闸输出：{name}'],
   'brake.warning': [
     'WARNING: a brake that closes too late lets a vertical axis drop. NOTICE: a brake that closes on a turning motor wears out.',
-    '警告：抱闸闭合过晚会使垂直轴下落。注意：抱闸在电机旋转时闭合会磨损。',
+    '警告：抱闸抱紧过晚会使垂直轴下落。注意：抱闸在电机仍在旋转时抱紧会造成磨损。',
   ],
   'regen.title': ['Braking resistor', '制动电阻'],
   'regen.help': [
@@ -302,7 +302,7 @@ export const functions = {
   'guide.run': ['Run…', '运行…'],
   'identify.agree': [
     'I agree. The travel is clear, nobody is near, and a hand is on the emergency stop.',
-    '我同意。行程无障碍，附近无人，手在急停按钮上。',
+    '我同意。行程内无障碍物，附近无人，且手已放在急停按钮上。',
   ],
   'identify.start': ['Start the identification', '开始辨识'],
   'guide.failures': ['These faults report failure', '以下故障表示失败'],

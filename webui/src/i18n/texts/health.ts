@@ -84,11 +84,11 @@ export const health = {
   'health.trigger': ['A controller may request a run', '控制器可请求运行'],
   'health.warning': [
     'WARNING. The axis moves at these times without anybody pressing a button, within the limits of the baseline. Guards and their interlocks must keep everybody out of the danger zone.',
-    '警告。在这些时间，无人按下按钮轴也会在基线限值内运动。防护装置及其联锁必须使所有人处于危险区域之外。',
+    '警告：到了这些时间，无人按下按钮，轴也会在基线限值内运动。防护装置及其联锁必须确保危险区域内无人。',
   ],
   'health.secured': [
     'Nobody can be in the danger zone at these times, and the axis may move within these limits',
-    '在这些时间危险区域内不会有人，且轴可在这些限值内运动',
+    '在这些时间，危险区域内不会有人，且允许轴在这些限值内运动',
   ],
   'health.permit': ['Permit', '许可'],
   'health.stations': ['All axes of the database, of every station', '数据库中所有站点的所有轴'],

@@ -2,10 +2,10 @@ import type { Texts } from '../types'
 
 /** Recordings of other programs on page Response. */
 export const imported = {
-  'import.title': ['Import a recording', '导入记录'],
+  'import.title': ['Import a recording', '导入录制'],
   'import.help': [
     'A recording of another program (TwinCAT Scope, CODESYS trace, a drive’s own scope, MATLAB) as a frequency response: CSV, also compressed with gzip, or MAT up to version 7. Nothing moves.',
-    '将其他程序（TwinCAT Scope、CODESYS 跟踪、驱动器示波器、MATLAB）的记录作为频率响应：CSV（可用 gzip 压缩）或版本 7 及以下的 MAT。不会产生运动。',
+    '将其他程序（TwinCAT Scope、CODESYS 跟踪、驱动器示波器、MATLAB）的录制作为频率响应：CSV（可用 gzip 压缩）或版本 7 及以下的 MAT。不会产生运动。',
   ],
   'import.choose': ['Choose a file', '选择文件'],
   'import.rows': ['{rows} rows, {form}', '{rows} 行，{form}'],
@@ -32,7 +32,7 @@ export const imported = {
   'import.structure.load_speed': ['torque to the speed of the load', '转矩到负载速度'],
   'import.structure.speed_loop': ['speed reference to speed', '速度给定到速度'],
   'import.more': ['Band and drive', '频段与驱动器'],
-  'import.filter': ['Filter of the recorded output', '所记录输出的滤波器'],
+  'import.filter': ['Filter of the recorded output', '所录制输出的滤波器'],
   'import.filterHelp': [
     'First-order low-pass; it is removed before inertia and gains are computed.',
     '一阶低通；在得出惯量和增益之前予以扣除。',
@@ -43,7 +43,7 @@ export const imported = {
   'import.first': ['First values', '前几个值'],
   'import.column': ['Column', '列'],
   'import.range': ['Range', '范围'],
-  'import.curves': ['Input and output over the whole recording', '整个记录中的输入和输出'],
+  'import.curves': ['Input and output over the whole recording', '整个录制中的输入和输出'],
   'import.found.periodic': [
     'Periodic excitation, period {period} s: {used} periods used, {left} left out as transient.',
     '周期激励，周期 {period} s：使用 {used} 个周期，舍弃 {left} 个过渡周期。',

@@ -10,7 +10,7 @@ export const library = {
   'library.kind': ['Kind', '类型'],
   'library.kind.all': ['Everything', '全部'],
   'library.kind.set': ['Parameter set', '参数集'],
-  'library.kind.recording': ['Recording', '记录'],
+  'library.kind.recording': ['Recording', '录制'],
   'library.kind.measurement': ['Measurement', '测量'],
   'library.kind.report': ['Report', '报告'],
   'library.tag': ['Tag', '标签'],
@@ -24,7 +24,7 @@ export const library = {
   'library.none': ['No entry matches.', '没有符合的条目。'],
   'library.empty': [
     'Nothing is stored yet. Save a parameter set, make a recording or a measurement.',
-    '尚无内容。请保存参数集、进行记录或测量。',
+    '尚无内容。请保存参数集、进行录制或测量。',
   ],
   'library.problems': ['These files could not be imported:', '以下文件无法导入：'],
   'library.version': ['version {number}', '版本 {number}'],

@@ -32,11 +32,11 @@ export const notListed = {
   'notListed.more': ['and {count} more', '以及另外 {count} 项'],
   'notListed.otherProduct': [
     'The description is of another product: it states vendor {vendor}, product {product}; the drive reports vendor {driveVendor}, product {driveProduct}.',
-    '描述文件属于其他产品：文件为厂家 {vendor}、产品 {product}；驱动器为厂家 {driveVendor}、产品 {driveProduct}。',
+    '描述文件属于其他产品：文件为厂商 {vendor}、产品 {product}；驱动器为厂商 {driveVendor}、产品 {driveProduct}。',
   ],
   'notListed.before': [
     'WARNING: units and limits come from the file and may be wrong. Before you move the axis, turn the shaft by hand and compare the position, then jog slowly with the motor uncoupled.',
-    '警告：单位和限值来自文件，可能有误。运动之前请手动转动轴并核对位置，然后在电机脱开负载时低速点动。',
+    '警告：单位和限值来自文件，可能有误。移动轴之前，请用手转动电机轴并核对位置，然后将电机与负载脱开，低速点动。',
   ],
   'notListed.outcome.repaired': ['repaired', '已修复'],
   'notListed.outcome.left out': ['left out', '已忽略'],
@@ -48,7 +48,7 @@ export const notListed = {
     'Your profile cannot be used: {problem}',
     '您的这个配置文件无法使用：{problem}',
   ],
-  'line.search': ['Search baud rate and parity', '搜索波特率和校验'],
+  'line.search': ['Search baud rate and parity', '搜索波特率和奇偶校验'],
   'line.help': [
     'Tries the usual settings at the stations given above (station 1 if none). Only reads are sent.',
     '在上面给出的站地址（未填则为 1）尝试常用设置，仅进行读取。',

@@ -111,7 +111,7 @@ export const parameters = {
   ],
   'motion.settingWarning': [
     'WARNING: the axis can start to move with this value. The motor must have no power. The shaft is monitored for 0.3 s after the write; if it turns, the old value is restored and a quick stop is sent.',
-    '警告：写入该值后轴可能开始运动。电机必须未得电。写入后监视轴 0.3 秒；若轴转动，将写回旧值并发送快速停止。',
+    '警告：写入该值后轴可能开始运动。电机必须未得电。写入后监视电机轴 0.3 秒；若电机轴转动，将恢复旧值并发送快速停止。',
   ],
   'motion.reason': ['Reason (log and audit)', '原因（记入日志和审计）'],
   'motion.until': [
@@ -122,11 +122,11 @@ export const parameters = {
   'motion.withinLabel': ['Limits', '允许范围'],
   'motion.within': [
     'No power at the motor, and a shaft that turns by at most 0.001 rev in 0.3 s.',
-    '电机不得电，且轴在 0.3 秒内转动不超过 0.001 转。',
+    '电机未得电，且电机轴在 0.3 秒内转动不超过 0.001 转。',
   ],
   'motion.consent': [
     'Nobody is in the danger zone of the axis, and a hand is on the emergency stop.',
-    '轴的危险区域内无人，且手在急停按钮上。',
+    '轴的危险区域内无人，且手已放在急停按钮上。',
   ],
   'motion.write': ['Write this setting', '写入该设置'],
   'motion.disableFirst': ['The axis has power: disable it first.', '轴已得电：请先断使能。'],

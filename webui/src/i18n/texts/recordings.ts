@@ -40,7 +40,7 @@ export const recordings = {
   ],
   'recordings.kind.csv_raw': [
     'In the units of the drive, every number exactly as it was recorded',
-    '采用驱动器自身的单位，每个数值与记录完全一致',
+    '采用驱动器自身的单位，每个数值与录制时完全一致',
   ],
   'recordings.kind.rrd': [
     'For rerun, in the units of the scope',
@@ -48,7 +48,7 @@ export const recordings = {
   ],
   'recordings.kind.mcap': [
     'In the units of the drive, every number exactly as it was recorded',
-    '采用驱动器自身的单位，每个数值与记录完全一致',
+    '采用驱动器自身的单位，每个数值与录制时完全一致',
   ],
   'recordings.delete': ['Delete {name}', '删除 {name}'],
   'recordings.deleteText': ['It cannot be restored.', '删除后无法恢复。'],

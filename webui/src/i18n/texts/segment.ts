@@ -5,7 +5,7 @@ export const segment = {
   'segment.title': ['Segment', '网段'],
   'segment.picture': [
     'The segment: computer, drives and cables in the order of the frames',
-    '网段：按报文顺序显示计算机、驱动器和电缆',
+    '网段：按帧经过的顺序显示计算机、驱动器和电缆',
   ],
   'segment.computer': ['Computer', '计算机'],
   'segment.noAnswer': ['no answer', '无应答'],

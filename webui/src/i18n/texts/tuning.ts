@@ -57,7 +57,7 @@ export const tuning = {
     '闭环下逐个频率测量：点数少，每点测量时间长。较慢；适合复核某个谐振峰。',
   ],
   'sweep.share': ['Excitation', '激励幅值'],
-  'sweep.shareHelp': ['of the torque limit', '占转矩限制'],
+  'sweep.shareHelp': ['of the torque limit', '占转矩限值'],
   'sweep.count': ['Realisations', '重复次数'],
   'sweep.countHelp': ['more take longer and reduce noise', '越多越慢，噪声越小'],
   'sweep.odd': [
@@ -70,11 +70,11 @@ export const tuning = {
   ],
   'sweep.moves': [
     'WARNING: the axis is enabled and excited with about {part} % of rated torque, at most {torque} %. It stays within ±{travel} rev of the present position and below {speed} rpm, returns, and is disabled. Keep everyone clear of the machine.',
-    '警告：轴将使能并以约 {part}%（最大 {torque}%）额定转矩激励，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
+    '警告：轴将使能并以约 {part}%（最大 {torque}%）额定转矩激励，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近机器。',
   ],
   'sweep.movesLoop': [
     'WARNING: the axis is enabled and follows a small, fast changing command, with at most {torque} % of rated torque. It stays within ±{travel} rev of the present position and below {speed} rpm, returns, and is disabled. Keep everyone clear of the machine.',
-    '警告：轴将使能并跟随快速变化的小幅指令，最大 {torque}% 额定转矩，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近。',
+    '警告：轴将使能并跟随快速变化的小幅指令，最大 {torque}% 额定转矩，在当前位置 ±{travel} 转内、低于 {speed} rpm 运动，之后返回原位并断使能。请确保无人靠近机器。',
   ],
   'excite.title': ['Preview of the excitation', '激励预览'],
   'excite.one': ['first realisation', '第一次激励'],
@@ -179,7 +179,7 @@ export const tuning = {
   ],
   'shape.hint.saturated': [
     'The torque was at its limit part of the time: lower the excitation, or allow more torque.',
-    '转矩有时达到限制：请降低激励或提高转矩限制。',
+    '转矩有时达到限值：请降低激励或提高转矩限值。',
   ],
   'shape.hint.moved': [
     'A peak has moved since the compared measurement. A part is loose or worn: check coupling, screws and belt before any notch. A notch would miss the peak next time.',
@@ -358,7 +358,7 @@ export const tuning = {
   ],
   'tune.free': [
     'WARNING: the axis will move. Check that it can travel this far in both directions, and that nobody is within reach.',
-    '警告：轴将运动。请确认轴在两个方向上均可运动这么远，且可及范围内无人。',
+    '警告：轴将运动。请确认轴在两个方向上均可运动这么远，且运动范围内无人。',
   ],
   'fold.first': ['First power', '首次通电'],
   'fold.firstHelp': ['Once, before the first closed loop.', '首次闭环之前做一次。'],
@@ -425,24 +425,24 @@ export const tuning = {
   ],
   'tool.moves': [
     'WARNING: the axis is enabled and moves several times, within ±{travel} rev of the present position, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
-    '警告：轴将使能并运动多次，限制在当前位置 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内，之后断使能。请确保无人靠近。',
+    '警告：轴将使能并运动多次，限制在当前位置 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内，之后断使能。请确保无人靠近机器。',
   ],
   'inertia.movesLimited': [
     'WARNING: the axis is enabled and moves slowly against both end stops, over at most {travel} rev each. Then it moves several times between them, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
-    '警告：轴将使能并缓慢触碰两端机械限位，每次最多 {travel} 转；随后在两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
+    '警告：轴将使能并缓慢触碰两端机械限位，每次最多 {travel} 转；随后在两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近机器。',
   ],
   'inertia.movesTaught': [
     'WARNING: the axis is enabled and moves several times between the taught ends, with at most {speed} rpm and {torque} % of rated torque. It is disabled afterwards. Keep everyone clear of the machine.',
-    '警告：轴将使能并在示教的两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近。',
+    '警告：轴将使能并在示教的两端之间运动多次，最大 {speed} rpm、{torque}% 额定转矩，之后断使能。请确保无人靠近机器。',
   ],
   'inertia.scheme': ['How it may travel', '运动方式'],
-  'inertia.scheme.free': ['Free, within the travel limit', '自由，在行程限制内'],
+  'inertia.scheme.free': ['Free, within the travel limit', '自由，在行程限值内'],
   'inertia.scheme.limited': ['Limited: search the ends', '受限：自动搜索两端'],
   'inertia.scheme.taught': ['Limited: taught ends', '受限：示教两端'],
   'inertia.help.free': ['Moves to both sides of the present position.', '在当前位置两侧运动。'],
   'inertia.help.limited': [
     'First moves slowly against both end stops with limited torque, within the travel limit.',
-    '先以限制转矩缓慢触碰两端机械限位，最远不超过行程限制。',
+    '先以限制转矩缓慢触碰两端机械限位，最远不超过行程限值。',
   ],
   'inertia.help.taught': [
     'Jog to each end on the Motion page and adopt the position here.',
@@ -498,7 +498,7 @@ export const tuning = {
   'gains.write': ['Write the gains', '写入增益'],
   'gains.confirm': [
     'WARNING: gains take effect at once. Too high gains make the axis oscillate: keep a hand on STOP at the next enabling. They are lost at power-off until the parameters are saved in the drive.',
-    '警告：增益写入后立即生效。增益过高会引起振荡：下次使能时请把手放在停止按钮上。未保存到驱动器前，断电会丢失。',
+    '警告：增益写入后立即生效。增益过高会引起振荡：下次使能时请将手放在“停止”按钮上。未保存到驱动器前，断电会丢失。',
   ],
   'candidate.title': ['Designs', '设计方案'],
   'candidate.help': [
@@ -545,7 +545,7 @@ export const tuning = {
   ],
   'autotune.motorHelp': [
     'from the data sheet; needed if the drive sets the load as a ratio to the motor and does not report the motor inertia',
-    '取自数据表；若驱动器以电机惯量的倍数设置负载，且不提供电机惯量，则需要填写',
+    '取自数据手册；若驱动器以电机惯量的倍数设置负载，且不提供电机惯量，则需要填写',
   ],
   'autotune.noMeaning': [
     'The manual of this drive does not explain its gains, so none can be computed. Change them in small steps and measure a step response after each.',
@@ -554,7 +554,7 @@ export const tuning = {
   'autotune.apply': ['Write and verify the result', '写入并验证结果'],
   'autotune.moves': [
     'WARNING: the axis is enabled and moves several times for about a minute (reciprocating moves, excitation and steps), within ±{travel} rev, {speed} rpm and {torque} % of rated torque. Keep everyone clear of the machine.',
-    '警告：轴将使能并运动多次，约一分钟：往复运动、激励和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近。',
+    '警告：轴将使能并运动多次，约一分钟：往复运动、激励和阶跃，限制在 ±{travel} 转、{speed} rpm、{torque}% 额定转矩内。请确保无人靠近机器。',
   ],
   'autotune.start': ['Start tuning', '开始整定'],
   'autotune.step.1': ['Pre-checks', '预检查'],
@@ -619,7 +619,7 @@ export const tuning = {
   'step.size': ['Size', '大小'],
   'step.moves': [
     'WARNING: the axis is enabled, moves within ±{travel} rev with at most {torque} % of rated torque, and returns. Keep everyone clear of the machine.',
-    '警告：轴将使能，在 ±{travel} 转内以最大 {torque}% 额定转矩运动并返回。请确保无人靠近。',
+    '警告：轴将使能，在 ±{travel} 转内以最大 {torque}% 额定转矩运动并返回。请确保无人靠近机器。',
   ],
   'step.start': ['Start the step', '开始阶跃'],
   'step.demand': ['commanded', '指令'],
