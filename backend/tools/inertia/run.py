@@ -32,7 +32,7 @@ from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.inertia.settings import InertiaRequest
 from backend.tools.inertia.texts import TEXTS, report
 from backend.tools.measuring.computing import meanwhile
-from backend.tools.measuring.recording import require_signals, share
+from backend.tools.measuring.recording import Recording, require_signals, share
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.moves.end_search import find_ends
 from backend.tools.moves.go_back import go_back
@@ -96,31 +96,38 @@ async def inertia(
         found = evaluate(recording, settings, facts)
         return found, oscillation_hz(recording, found)
 
-    result, swing_hz = await meanwhile(evaluated, back_to(home))
-    played_s = recording.velocity_rad_s.size / recording.sample_rate_hz
-    if swing_hz is not None and (repeats or Repeats()).allow(
-        threshold.GENTLY * played_s + threshold.AROUND_S
-    ):
-        # Repeat with a shape that does not excite the oscillation of the load.
-        gentle = Shape.against(swing_hz)
-        reported = share(progress, 0.66, 0.9, text("inertia.once-more-gently", swing_hz=swing_hz))
-        rough = look.rough
-        heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
-        better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))
-        await back_to(begin)
-        again = await identification_moves(
-            axis, session, settings, facts, better, travel, gentle, reported
-        )
-        # With short travel, a gentle move may contain too little to evaluate: the first result
-        # stays.
-        with contextlib.suppress(NotAllowed):
-            calm = await asyncio.to_thread(evaluate, again, settings, facts)
-            if uncertainty_of(calm) < uncertainty_of(result):
-                recording, result = again, calm
-        await back_to(home)
-    if keep is not None:
-        # With the ends that were found, so that an evaluation of the file states them too.
-        keep("inertia", *raw_of(recording, replace(settings, ends_rev=ends), facts))
+    try:
+        result, swing_hz = await meanwhile(evaluated, back_to(home))
+        played_s = recording.velocity_rad_s.size / recording.sample_rate_hz
+        if swing_hz is not None and (repeats or Repeats()).allow(
+            threshold.GENTLY * played_s + threshold.AROUND_S
+        ):
+            # Repeat with a shape that does not excite the oscillation of the load.
+            gentle = Shape.against(swing_hz)
+            step = text("inertia.once-more-gently", swing_hz=swing_hz)
+            rough = look.rough
+            heavier = max(result.inertia_kgm2.value, rough.inertia_kgm2)
+            better = replace(look, rough=RoughFit(heavier, rough.coulomb_nm, rough.gravity_nm))
+            await back_to(begin)
+            again: Recording | None = None
+            # Gentle moves take longer, and may not fit into the limits: the first result stays.
+            with contextlib.suppress(OutOfRange):
+                again = await identification_moves(
+                    axis, session, settings, facts, better, travel, gentle,
+                    share(progress, 0.66, 0.9, step),
+                )  # fmt: skip
+            # With short travel, a gentle move may contain too little to evaluate.
+            with contextlib.suppress(NotAllowed):
+                if again is not None:
+                    calm = await asyncio.to_thread(evaluate, again, settings, facts)
+                    if uncertainty_of(calm) < uncertainty_of(result):
+                        recording, result = again, calm
+            await back_to(home)
+    finally:
+        # Also if the evaluation or the way back fails: the measurement is not lost.
+        if keep is not None:
+            # With the ends that were found, so that an evaluation of the file states them too.
+            keep("inertia", *raw_of(recording, replace(settings, ends_rev=ends), facts))
     return InertiaOutcome(
         result,
         f"host, {settings.scheme}",

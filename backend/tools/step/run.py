@@ -77,9 +77,10 @@ async def step_response(
             facts.rated_torque_nm,
             share(progress, 0.1, 0.85, text("step.stepping")),
         )
-    await go_back(axis, session, home, settings.envelope, facts)
+    # First of all, so that the measurement is not lost if the way back fails.
     if keep is not None:
         keep("step", *raw_of(recording, demand, settings, facts))
+    await go_back(axis, session, home, settings.envelope, facts)
     return evaluate(recording, demand, settings, facts.rated_torque_nm)
 
 
