@@ -120,9 +120,11 @@ class RecordingLibrary:
         words = search.lower().split()
         skip = set(busy)
         found = [
-            self._listed(path) for path in files_of(self.folder, SUFFIX) if path.name not in skip
+            stored
+            for path in files_of(self.folder, SUFFIX)
+            if path.name not in skip and (stored := self._listed(path)) is not None
         ]
-        fitting = [s for s in found if s is not None and all(word in s.words() for word in words)]
+        fitting = [s for s in found if all(word in s.words() for word in words)]
         return sorted(fitting, key=lambda s: -s.modified)
 
     def _listed(self, path: Path) -> Stored | None:

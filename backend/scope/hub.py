@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -21,6 +22,8 @@ from backend.axis.axis import Axis
 from backend.drive.readings import Reading
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
+
+log = logging.getLogger(__name__)
 
 #: A block is delivered at least this often [s].
 FLUSH_S = 0.04
@@ -160,10 +163,12 @@ class _Sampler:
     def __init__(self, axis: Axis) -> None:
         self.axis = axis
         self._subscriptions: list[Subscription] = []
+        self._added = asyncio.Event()
         self._task = asyncio.create_task(self._run(), name=f"scope-{axis.drive.id}")
 
     def add(self, subscription: Subscription) -> None:
         self._subscriptions.append(subscription)
+        self._added.set()
 
     def remove(self, subscription: Subscription) -> bool:
         """Remove a subscription; return whether none is left."""
@@ -181,8 +186,12 @@ class _Sampler:
             now = time.monotonic()
             due = [s for s in self._subscriptions if s.due <= now]
             if not due:
+                self._added.clear()
                 waits = [s.due - now for s in self._subscriptions]
-                await asyncio.sleep(min(waits, default=FLUSH_S))
+                # A new subscriber does not wait for the turn of a slow one.
+                with contextlib.suppress(TimeoutError):
+                    async with asyncio.timeout(min(waits, default=FLUSH_S)):
+                        await self._added.wait()
                 continue
             for subscription in due:
                 period = max(subscription.period_s, SHORTEST_PERIOD_S)
@@ -193,6 +202,11 @@ class _Sampler:
                 readings = await drive.read_many(keys)
             except DriveError:
                 # The monitor shows the cause; here it appears as a gap in time.
+                await asyncio.sleep(RETRY_S)
+                continue
+            except Exception:
+                # A sampler that ended unnoticed would deliver nothing to anybody any more.
+                log.exception("the signals of %s cannot be sampled", drive.name)
                 await asyncio.sleep(RETRY_S)
                 continue
             middle = (before + time.monotonic()) / 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -140,9 +140,16 @@ class Bench:
         return connected
 
     async def connect(
-        self, url: str, station: int, profile: str, name: str = "", *, found: Found | None = None
+        self,
+        url: str,
+        station: int,
+        profile: str,
+        name: str = "",
+        *,
+        found: Found | None = None,
+        drive_id: str = "",
     ) -> ConnectedDrive:
-        """Add the drive at a station to the bench.
+        """Add the drive at a station to the bench, with this id or a new one.
 
         Raises:
             Busy: another drive uses this station.
@@ -153,10 +160,19 @@ class Bench:
         self._require_free(link, url, station)
         facts, spec = profile_for(link.kind, profile)
         link.attach(station, facts)
+        if name and not drive_id:
+            # A person who gives the name of a missing drive has it at another place now.
+            missing = next((each for each in self._unreached if each.name == name), None)
+            if missing is not None:
+                self._unreached.remove(missing)
+                drive_id = missing.id
         name = name or self._names.unused(
             url, station, [m.drive.name for m in self.connected_drives.values()]
         )
-        drive_id = new_id(name or f"{profile}-{station}", self.connected_drives)
+        if not drive_id or drive_id in self.connected_drives:
+            # What is kept of an axis that is missing now must not become that of another one.
+            taken = {*self.connected_drives, *(each.id for each in self._unreached)}
+            drive_id = new_id(name or f"{profile}-{station}", taken)
         drive = Drive(
             drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority
         )
@@ -391,6 +407,7 @@ class Bench:
                 profile=m.drive.profile.drive,
                 ports=self._ports_of(m.drive),
                 serial=m.drive.found.serial if m.drive.found else None,
+                id=m.drive.id,
             )
             for m in self.connected_drives.values()
         ]
@@ -414,8 +431,9 @@ class Bench:
         for problem in problems:
             self.journal.add(problem, level="error")
         self._restoring = True
+        self._unreached = _with_ids(saved)
         try:
-            for item in saved:
+            for item in list(self._unreached):
                 await self._restore_drive(item)
         finally:
             self._restoring = False
@@ -423,11 +441,13 @@ class Bench:
     async def _restore_drive(self, item: SavedDrive) -> None:
         first, *others = item.ports
         try:
-            connected = await self.connect(first.url, first.station, item.profile, item.name)
+            connected = await self.connect(
+                first.url, first.station, item.profile, item.name, drive_id=item.id
+            )
         except (DriveError, ProfileError) as error:
-            self._unreached.append(item)
             self._not_connected(item, error)
             return
+        self._unreached.remove(item)
         drive = connected.drive
         drive.notes = item.notes
         if item.serial is not None:
@@ -461,3 +481,16 @@ class Bench:
     async def _close_buses(self) -> None:
         await asyncio.gather(*(m.monitor.close() for m in self.connected_drives.values()))
         await self.buses.close_all()
+
+
+def _with_ids(saved: Sequence[SavedDrive]) -> list[SavedDrive]:
+    """The drives of a list, each with an id of its own: the stored one, else as it was made."""
+    taken: set[str] = set()
+    found = []
+    for item in saved:
+        name, drive_id = item.name or f"{item.profile}-{item.ports[0].station}", item.id
+        if not drive_id or drive_id in taken or drive_id != new_id(drive_id, ()):
+            drive_id = new_id(name, {*taken, *(each.id for each in saved)})
+        taken.add(drive_id)
+        found.append(replace(item, id=drive_id))
+    return found

@@ -26,13 +26,17 @@ class SavedPort:
 
 @dataclass(frozen=True, slots=True)
 class SavedDrive:
-    """A drive in the list; the first port is the one by which it was connected."""
+    """A drive in the list; the first port is the one by which it was connected.
+
+    ``id`` names what is kept of the axis, such as its scales; empty in lists of earlier versions.
+    """
 
     name: str
     profile: str
     ports: tuple[SavedPort, ...]
     notes: str = ""
     serial: int | None = None
+    id: str = ""
 
     def __post_init__(self) -> None:
         if not self.ports:

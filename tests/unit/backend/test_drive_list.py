@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from backend.axis.remembered import AxisRecord
+from backend.scales.taught import Taught
 from backend.station.bench import Bench
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
 from backend.store.files import StorageFailed
@@ -91,7 +93,7 @@ async def _not_there() -> None:
 
 async def test_notes_and_serial_number_outlive_several_starts(tmp_path: Path) -> None:
     drives = DriveList(tmp_path / "bench.json")
-    here = SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77)
+    here = SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77, "x")
     drives.store([here])
     for _ in range(3):
         bench = _bench(tmp_path)
@@ -108,8 +110,8 @@ async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Pa
     drives = DriveList(tmp_path / "bench.json")
     both = SavedPort("mlink://virtual2", 4)
     saved = [
-        SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77),
-        SavedDrive("Y", "mms7", (SavedPort("mlink://virtual1", 1), both), "right", 78),
+        SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), "left", 77, "x"),
+        SavedDrive("Y", "mms7", (SavedPort("mlink://virtual1", 1), both), "right", 78, "y"),
     ]
     drives.store(saved)
     bench = _bench(tmp_path, "mlink://virtual0", "mlink://virtual2")
@@ -122,7 +124,7 @@ async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Pa
     await bench.close()
     loaded, _ = drives.load()
     assert sorted(loaded, key=lambda each: each.name) == [
-        saved[0], SavedDrive("Y", "mms7", saved[1].ports, "far right", 78),
+        saved[0], SavedDrive("Y", "mms7", saved[1].ports, "far right", 78, "y"),
     ]  # fmt: skip
     # The next start has all of them; a drive that takes the place of a missing one replaces it.
     bench = _bench(tmp_path, "mlink://virtual0")
@@ -143,4 +145,41 @@ async def test_a_bench_may_have_many_drives(tmp_path: Path) -> None:
     bench = _bench(tmp_path)
     await bench.restore()
     assert len(bench.connected_drives) == 40
+    await bench.close()
+
+
+async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Path) -> None:
+    """Names without Latin letters give ids by number, which must not shift."""
+    drives = DriveList(tmp_path / "bench.json")
+    drives.store(
+        SavedDrive(name, "mms7", (SavedPort(f"mlink://virtual{n}", 1),))
+        for n, name in enumerate(("轴一", "轴二"))
+    )
+    bench = _bench(tmp_path)
+    await bench.restore()
+    second = bench.connected("drive-2").drive
+    assert second.name == "轴二"
+    taught = Taught(counts_per_rev=1000.0)
+    bench.axis_records.put("drive", AxisRecord(scales=taught))
+    bench.rename("drive-2", None, "stored")
+    await bench.close()
+    bench = _bench(tmp_path, "mlink://virtual0")
+    await bench.restore()
+    assert list(bench.connected_drives) == ["drive-2"]
+    other = await bench.connect("mlink://virtual5", 1, "mms7", "轴三")
+    assert other.drive.id == "drive-3"
+    # The first one is found again at another adapter.
+    first = await bench.connect("mlink://virtual6", 1, "mms7", "轴一")
+    assert first.drive.id == "drive"
+    assert bench.axis_records.get(first.drive.id).scales == taught
+    await bench.close()
+    assert len(drives.load()[0]) == 3
+    # Another order in the list changes nothing.
+    loaded, _ = drives.load()
+    drives.store(reversed(loaded))
+    bench = _bench(tmp_path)
+    await bench.restore()
+    assert {m.drive.name: m.drive.id for m in bench.connected_drives.values()} == {
+        "轴一": "drive", "轴二": "drive-2", "轴三": "drive-3",
+    }  # fmt: skip
     await bench.close()
