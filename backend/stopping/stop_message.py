@@ -13,6 +13,8 @@ def stop_message(name: str, found: AxisStop) -> Text | None:
     match found.verdict:
         case Verdict.STOPPED:
             return None
+        case Verdict.STILL_MOVING if found.superseded:
+            return text("stopping.superseded", drive=name)
         case Verdict.COASTING:
             return text("stopping.coasts", drive=name, speed=speed, unit=found.speed_unit)
         case Verdict.STILL_MOVING:

@@ -11,6 +11,7 @@ a long ramp keeps its power, because coasting is worse.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Awaitable, Callable
 
@@ -23,7 +24,7 @@ from backend.axis.stop.settings import (
     deceleration_rpm_s,
     known_settings,
 )
-from backend.stopping.speed import LOOK_S, Sample, SpeedWatch, units_of
+from backend.stopping.speed import DWELL_S, LOOK_S, Sample, SpeedWatch, units_of
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
@@ -46,6 +47,8 @@ _LOOK_EVERY_S = 0.02
 _AGAIN_S = 0.01
 #: The look before STOP and the last one span this time at least.
 _SPAN_S = 0.03
+#: After a new command, the looks that standstill needs are still taken within this time, s.
+_NEW_COMMAND_S = DWELL_S + 0.1
 #: Time of turning without power after which it is no longer the end of a quick stop, s.
 _UNPOWERED_S = 0.1
 #: Ratio of the speed to that at the start of that time: below the first the axis decelerates,
@@ -150,7 +153,7 @@ class StopWatch:
         watch, axis, ramp_known = self._watch, self._axis, False
         while True:
             if axis.permits != self._permits:
-                return self._superseded()
+                return await self._superseded()
             await asyncio.sleep(_LOOK_EVERY_S)
             try:
                 if axis.stop_pending and await axis.repeat_stop():
@@ -309,7 +312,13 @@ class StopWatch:
         coasts = sample.state not in _POWERED and self._watch.slows()
         return self._verdict(Verdict.COASTING if coasts else Verdict.STILL_MOVING, problem)
 
-    def _superseded(self) -> AxisStop:
+    async def _superseded(self) -> AxisStop:
+        """The verdict where a new command was given: it may not have moved the axis yet."""
+        until = time.monotonic() + _NEW_COMMAND_S
+        with contextlib.suppress(DriveError):
+            while not self._watch.stands() and time.monotonic() < until:
+                await asyncio.sleep(_LOOK_EVERY_S)
+                await self._watch.look()
         found = Verdict.STOPPED if self._watch.stands() else Verdict.STILL_MOVING
         return self._verdict(found, superseded=True)
 

@@ -17,3 +17,5 @@ stopping_still-moves = { $drive } still moves{ $speed ->
     } after STOP: use the machine's emergency stop
 stopping_turns-with-power = { $drive } is enabled and turns at { $speed } { $unit }, but nobody moves it with servodeck: press STOP
 stopping_turns-without-power = { $drive } turns at { $speed } { $unit } without power: by hand, by gravity or by the drive itself
+stopping_superseded = a new command was given to { $drive } before its standstill after STOP was seen
+    .remedy = look at the axis; press STOP again if it must not move

@@ -17,3 +17,5 @@ stopping_still-moves = 停止（STOP）后 { $drive } 仍{ $speed ->
     }运动：请使用机器的急停
 stopping_turns-with-power = { $drive } 已使能并以 { $speed } { $unit } 转动，但此处无人操作：请按“停止”（STOP）
 stopping_turns-without-power = { $drive } 在未得电时以 { $speed } { $unit } 转动：由人手、重力或驱动器自身引起
+stopping_superseded = STOP 后尚未确认 { $drive } 静止，就已收到新的命令
+    .remedy = 请观察该轴；如不允许其运动，请再次按下 STOP
