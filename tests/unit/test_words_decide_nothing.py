@@ -71,7 +71,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ): "a person's own words, which must not be empty",
     (
         "backend/recording/library.py",
-        "fitting = [s for s in found if s is not None and all(word in s.words() for word in words)]",
+        "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by words of their descriptions",
     (
         "backend/audit/trail.py",
