@@ -31,7 +31,7 @@ from drivers.halt import HaltCause, Halted, LoopState
 from drivers.link import CyclicSignal, LinkEvent, ScopeBlock, Trajectory, Unsubscribe
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Phase
-from drivers.motion.setpoints import require_fits
+from drivers.motion.setpoints import require_playable
 from drivers.texts.message import Text, text
 
 SHORTEST_CYCLE_S = 0.001
@@ -238,11 +238,12 @@ class CanopenCyclic:
         Raises:
             NotAllowed: not running or not enabled, a target that is not a mapped output, a jump at
                 the beginning, or an envelope limit whose signal is not among the inputs.
-            OutOfRange: a value does not fit its target, or the number of offsets differs.
+            OutOfRange: a value does not fit its target or the envelope, there is none, or the
+                number of offsets differs; nothing was sent.
         """
         loop = self._require_running()
         for trajectory in trajectories:
-            require_fits(trajectory)
+            require_playable(trajectory)
         motions = [(t.station, motion_of(t, loop.cycle_s)) for t in trajectories]
         for trajectory in trajectories:
             self._require_axis(trajectory.station)

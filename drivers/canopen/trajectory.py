@@ -11,7 +11,7 @@ from drivers.motion.setpoints import longest_step
 
 
 def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
-    """Convert a trajectory checked by `drivers.motion.setpoints.require_fits` to cycles."""
+    """Convert a trajectory checked by `drivers.motion.setpoints.require_playable` to cycles."""
     envelope = trajectory.envelope
     offsets = trajectory.offset_values
     return Motion(

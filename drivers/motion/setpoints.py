@@ -13,6 +13,18 @@ from profiles.schema import INTEGER_RANGE
 TARGETS = {0x607A: "position", 0x60FF: "velocity", 0x6071: "torque"}
 
 
+def require_playable(trajectory: Trajectory) -> None:
+    """Check every value against its object and the envelope; on every bus before anything is sent.
+
+    Raises:
+        NotAllowed: the target is not a setpoint of cyclic motion.
+        OutOfRange: a value does not fit its object or the envelope, there are no values, or values
+            and offsets differ in number.
+    """
+    require_fits(trajectory)
+    require_within_envelope(trajectory)
+
+
 def require_fits(trajectory: Trajectory) -> None:
     """Check that every value fits its object, and that offsets, if any, match in number.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Trajectory
-from drivers.motion.setpoints import longest_step, require_fits, require_within_envelope
+from drivers.motion.setpoints import longest_step, require_playable
 
 
 def message_of(trajectory: Trajectory) -> Message:
@@ -18,8 +18,7 @@ def message_of(trajectory: Trajectory) -> Message:
         NotAllowed: the target is not a setpoint of cyclic motion.
         OutOfRange: a value does not fit its object or the envelope.
     """
-    require_fits(trajectory)
-    require_within_envelope(trajectory)
+    require_playable(trajectory)
     message: Message = {
         "station": trajectory.station,
         "target": trajectory.target.index,

@@ -192,16 +192,17 @@ async def test_without_renewal_the_speed_ramps_down_and_the_axis_is_disabled(
 async def test_leaving_the_envelope_stops_the_axis(bench: Bench, link: CanopenLink) -> None:
     events: list[LinkEvent] = []
     link.listen(events.append)
-    await _run(link, [CONTROL, TARGET, MODE])
-    await _enable(link, CSP)
-    values = np.arange(0, 20000, 10, dtype=np.int64)
+    await _run(link, [CONTROL, SPEED_TARGET, MODE])
+    await _enable(link, CSV)
+    values = np.full(2000, 100, np.int64)
     envelope = Envelope(position_max=500)
-    await _cyclic(link).play([Trajectory(5, TARGET.address, values, envelope, renew_s=10)])
+    await _cyclic(link).play([Trajectory(5, SPEED_TARGET.address, values, envelope, renew_s=10)])
+    bench.wire.do(lambda: bench.device.turn_by_hand(600))
     await until(lambda: bench.device.value(0x6041) != 0x0237)
     assert any(
         "position" in e.text.words() and "beyond the limit of 500" in e.text.words() for e in events
     )
-    assert bench.device.value(0x6064) < 2000
+    assert bench.device.value(0x60FF) == 0
 
 
 async def test_what_cannot_be_played_is_refused(link: CanopenLink) -> None:
