@@ -8,7 +8,8 @@ blocking code on a thread of its own, so that there is one transaction at a time
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import asyncio
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -92,6 +93,20 @@ class LinkEvent:
     station: int | None
     text: Text
     code: int | None = None
+
+
+def tell(listeners: Iterable[Callable[[LinkEvent], None]], event: LinkEvent) -> None:
+    """Call each listener on the event loop's thread.
+
+    One that fails is reported to the event loop, and keeps neither the bus nor the other listeners
+    from going on.
+    """
+    for listener in tuple(listeners):
+        try:
+            listener(event)
+        except Exception as error:
+            context = {"message": f"a listener failed at {event}", "exception": error}
+            asyncio.get_running_loop().call_exception_handler(context)
 
 
 Progress = Callable[[float, Text], None]

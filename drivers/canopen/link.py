@@ -50,6 +50,7 @@ from drivers.link import (
     Progress,
     Unsubscribe,
     lists_nothing,
+    tell,
 )
 from drivers.texts.message import Text, text
 from profiles.schema import LinkKind, Profile
@@ -449,8 +450,7 @@ class CanopenLink:
             loop.call_soon_threadsafe(self._notify, event)
 
     def _notify(self, event: LinkEvent) -> None:
-        for listener in list(self._listeners):
-            listener(event)
+        tell(self._listeners, event)
 
 
 def _object(address: Address) -> tuple[int, int]:

@@ -6,7 +6,6 @@ incident is an event. Nothing here blocks, as the other process owns the wire.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -32,7 +31,17 @@ from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_fr
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list
 from drivers.flight.segment import SegmentRecorder
-from drivers.link import Address, Cyclic, Found, Link, LinkEvent, LinkQuality, Progress, Unsubscribe
+from drivers.link import (
+    Address,
+    Cyclic,
+    Found,
+    Link,
+    LinkEvent,
+    LinkQuality,
+    Progress,
+    Unsubscribe,
+    tell,
+)
 from drivers.texts.message import Text, prose, text
 from profiles.schema import LinkKind, Profile
 
@@ -408,13 +417,8 @@ class EthercatLink:
 
     def _notify(self, event: LinkEvent) -> None:
         self.recorder.note(f"{event.kind}: {event.text.words()}", event.station)
-        for listener in tuple(self._listeners):
-            try:
-                listener(event)
-            except Exception as error:
-                # Raised here it would be taken for a fault of the host process, which is replaced.
-                context = {"message": f"a listener failed at {event}", "exception": error}
-                asyncio.get_running_loop().call_exception_handler(context)
+        # An error raised here would be taken for a fault of the host process, which is replaced.
+        tell(self._listeners, event)
 
 
 def _found(item: Message) -> Found:
