@@ -106,9 +106,12 @@ def _upload_segments(mux: bytes, announced: int | None) -> Transfer[bytes]:
             yield from _give_up(mux, ABORT_TOGGLE, text("sdo.segment-twice-or-lost"))
         data += answer[1 : 8 - (command >> 1 & 7)]
         if len(data) > (_MAX_BYTES if announced is None else announced):
-            yield from _give_up(
-                mux, ABORT_LENGTH, text("sdo.more-than-announced", announced=announced)
+            too_much = (
+                text("sdo.more-than-accepted", most=_MAX_BYTES)
+                if announced is None
+                else text("sdo.more-than-announced", announced=announced)
             )
+            yield from _give_up(mux, ABORT_LENGTH, too_much)
         if command & 0x01:
             break
         empty = 0 if command >> 1 & 7 < 7 else empty + 1

@@ -147,3 +147,22 @@ def test_a_withdrawn_emergency_is_no_sign_against_two_nodes_with_one_number() ->
     assert watch.stray_answer(5, 1.0) is not None
     watch.observe(Frame(0x85, bytes(8)), 2.0)
     assert watch.record(5).conflict is not None
+
+
+@pytest.mark.parametrize("announced", [None, 4])
+def test_more_than_was_announced_or_is_accepted_is_said_with_a_number(
+    announced: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without an announced size the text was "more than the  bytes it announced"."""
+    monkeypatch.setattr(sdo, "_MAX_BYTES", 5)
+    transfer = sdo.upload(0x1008, 0)
+    next(transfer)
+    begin = b"\x41\x08\x10\0\4\0\0\0" if announced else b"\x40\x08\x10\0\0\0\0\0"
+    assert transfer.send(begin).send[0][0] == 0x60
+    assert transfer.send(b"\0" + bytes(7)).send == (sdo.abort_frame(b"\x08\x10\0", 0x06070010),)
+    with pytest.raises(ProtocolError) as refused:
+        transfer.send(b"")
+    text = refused.value.text
+    en, zh = ("the 4 bytes", "4 字节") if announced else ("5 bytes", "5 字节")
+    assert f"more than {en}" in text.words()
+    assert zh in text.words("zh")

@@ -6,6 +6,7 @@ sdo_block-checksum = the checksum of a block transfer is wrong
 sdo_block-does-not-end = the drive does not end its block transfer
 sdo_block-not-taken = the drive accepts no segment of a block
 sdo_block-size = the drive asked for blocks of { $block }
+sdo_more-than-accepted = the drive sent more than { $most } bytes, without announcing how many
 sdo_more-than-announced = the drive sent more than the { $announced } bytes it announced
 sdo_same-segments = the same segments come again and again
 sdo_segment-out-of-turn = a segment was acknowledged out of turn

@@ -6,6 +6,7 @@ sdo_block-checksum = 块传输的校验和错误
 sdo_block-does-not-end = 驱动器不结束块传输
 sdo_block-not-taken = 驱动器不接受块中的任何段
 sdo_block-size = 驱动器要求的块大小为 { $block }
+sdo_more-than-accepted = 驱动器未声明长度，发送的数据超过 { $most } 字节
 sdo_more-than-announced = 驱动器发送的数据超过其声明的 { $announced } 字节
 sdo_same-segments = 相同的段反复到达
 sdo_segment-out-of-turn = 某一段的确认顺序错误
