@@ -16,6 +16,9 @@ from profiles.schema import PdoSet, Profile
 
 Direction = Literal["rx", "tx"]
 
+_PDOS = 512
+"""PDOs of a direction: 1600h to 17FFh and 1A00h to 1BFFh (clauses 7.5.2.36 and 7.5.2.38)."""
+
 
 @dataclass(frozen=True, slots=True)
 class FixedPdo:
@@ -63,8 +66,12 @@ def fixed_pdos(profile: Profile, station: int) -> tuple[FixedPdo, ...]:
 
 
 def _fixed(each: PdoSet, profile: Profile, station: int) -> FixedPdo | None:
-    """Return None if mapped bits are not whole bytes, or if the identifier is unknown."""
+    """Return None if mapped bits are not whole bytes, if the identifier is unknown, or if the
+    index is not that of a PDO of this direction.
+    """
     number = each.index - (0x1600 if each.direction == "rx" else 0x1A00)
+    if not 0 <= number < _PDOS:
+        return None
     bases = RPDO if each.direction == "rx" else TPDO
     if each.identifier is not None:
         cob_id = each.identifier.at(station)
