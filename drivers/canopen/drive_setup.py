@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
-from drivers.canopen.fixed_pdo import FixedPdo
+from drivers.canopen.fixed_pdo import PDOS, FixedPdo
+from drivers.canopen.frames import TPDO
 from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
 from drivers.canopen.sdo import fitted
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
@@ -31,16 +32,14 @@ class DriveSetup:
         self._undo: list[tuple[int, SdoWrite]] = []
 
     def map_pdos(self, pdos: Sequence[PdoPlan]) -> None:
-        """Map these PDOs, and disable the other input PDOs (of four) of their stations.
+        """Map these PDOs, and disable the other input PDOs of their stations.
 
         Raises:
             NotAllowed: a drive refuses the mapping of a signal; the message names it.
         """
         for station in sorted({p.station for p in pdos}):
             used = {p.number for p in pdos if (p.station, p.direction) == (station, "tx")}
-            for number in range(4):
-                if number not in used:
-                    self._silence(station, 0x1800 + number)
+            self._silence_others(station, used)
         for pdo in pdos:
             if pdo.fixed is None:
                 self._map(pdo)
@@ -92,14 +91,27 @@ class DriveSetup:
             self._undo.pop()  # unchanged
             raise
 
-    def _silence(self, station: int, communication: int) -> None:
+    def _silence_others(self, station: int, used: Collection[int]) -> None:
+        """Disable the input PDOs that are not ``used``: they load the bus without a signal of ours.
+
+        Of those beyond the pre-defined four, the first that the drive does not have is the end.
+        """
+        for number in range(PDOS):
+            if number in used:
+                continue
+            if not self._silence(station, 0x1800 + number) and number >= len(TPDO):
+                return
+
+    def _silence(self, station: int, communication: int) -> bool:
+        """Disable an input PDO; return whether the drive has it."""
         try:
             cob = int.from_bytes(self._read(station, communication, 1), "little")
-            if not cob & INVALID:
-                data = (cob | INVALID).to_bytes(4, "little")
-                self._change(station, SdoWrite(communication, 1, data))
         except Rejected:
-            return  # a drive without this PDO has nothing to disable
+            return False  # nothing to disable
+        if not cob & INVALID:
+            closed = (cob | INVALID).to_bytes(4, "little")
+            self._tried(station, SdoWrite(communication, 1, closed))
+        return True
 
     def _map(self, pdo: PdoPlan) -> None:
         station = pdo.station

@@ -16,7 +16,7 @@ from profiles.schema import PdoSet, Profile
 
 Direction = Literal["rx", "tx"]
 
-_PDOS = 512
+PDOS = 512
 """PDOs of a direction: 1600h to 17FFh and 1A00h to 1BFFh (clauses 7.5.2.36 and 7.5.2.38)."""
 
 
@@ -70,7 +70,7 @@ def _fixed(each: PdoSet, profile: Profile, station: int) -> FixedPdo | None:
     index is not that of a PDO of this direction.
     """
     number = each.index - (0x1600 if each.direction == "rx" else 0x1A00)
-    if not 0 <= number < _PDOS:
+    if not 0 <= number < PDOS:
         return None
     bases = RPDO if each.direction == "rx" else TPDO
     if each.identifier is not None:

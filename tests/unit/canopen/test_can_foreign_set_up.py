@@ -12,6 +12,7 @@ import pytest
 
 from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.drive_setup import DriveSetup
+from drivers.canopen.fixed_pdo import FixedPdo
 from drivers.canopen.frames import NMT_START, Frame
 from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
@@ -259,3 +260,73 @@ async def test_a_start_that_fails_at_its_last_step_leaves_nothing_running() -> N
         await cyclic.start()
     assert not cyclic.running
     assert {key: node.objects[key] for key in before_the_loss()} == before_the_loss()
+
+
+def inputs(count: int, gap: int | None = None) -> dict[tuple[int, int], bytes]:
+    """Communication parameters of so many active input PDOs, and the contents of the first."""
+    found = {
+        (0x1800 + n, 1): struct.pack("<I", 0x40000185 if n == 0 else 0x40000680 + n)
+        for n in range(count)
+        if n != gap
+    }
+    return found | {(0x1800, 2): b"\xff", (0x1A00, 0): b"\0"}
+
+
+class Asked(Node):
+    """Records what is read of the communication parameters."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self.asked: list[int] = []
+
+    def read(self, station: int, index: int, subindex: int) -> bytes:
+        self.asked.append(index)
+        return super().read(station, index, subindex)
+
+
+POSITION = CyclicSignal(5, Address(0x6064, 0, "INT32"), "position")
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 9, 512])
+def test_every_other_input_of_a_node_is_silenced_and_comes_back(count: int) -> None:
+    """From the fifth on they went on loading the bus, perhaps with an identifier of ours."""
+    node = Asked(inputs(count))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "tx", 0, (POSITION,))])
+    words = [struct.unpack("<I", node.objects[0x1800 + n, 1])[0] for n in range(count)]
+    assert [bool(word & 0x80000000) for word in words] == [False, *[True] * (count - 1)]
+    ends = max(min(count, 511), 4)
+    assert max(i for i in node.asked if i < 0x1A00) == 0x1800 + ends, "then it has no more"
+    setup.undo()
+    back = {key: data for key, data in node.objects.items() if key != (0x1A00, 1)}
+    assert back == inputs(count)
+
+
+def test_a_gap_among_the_first_four_inputs_is_not_their_end() -> None:
+    node = Node(inputs(6, gap=2))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "tx", 0, (POSITION,))])
+    for number in (1, 3, 4, 5):
+        assert node.objects[0x1800 + number, 1][3] & 0x80
+
+
+def test_an_input_that_cannot_be_silenced_is_not_the_end_of_them() -> None:
+    node = Node(inputs(7), frozenset({(0x1805, 1)}))
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    setup.map_pdos([PdoPlan(5, "tx", 0, (POSITION,))])
+    assert node.objects[0x1806, 1][3] & 0x80
+    setup.undo()
+    assert {key: node.objects[key] for key in inputs(7)} == inputs(7)
+
+
+def test_a_fixed_input_beyond_the_fourth_that_is_used_stays() -> None:
+    node = Node(
+        inputs(7)
+        | {(0x1A05, 0): b"\1", (0x1A05, 1): struct.pack("<I", 0x60640020)}
+        | {(0x1805, 2): b"\x01"}
+    )
+    setup = DriveSetup(node.read, node.write, own_id=127)
+    fixed = FixedPdo("tx", 5, 0x685, ((POSITION.address, 4),))
+    setup.map_pdos([PdoPlan(5, "tx", 5, (POSITION,), fixed)])
+    valid = [n for n in range(7) if not node.objects[0x1800 + n, 1][3] & 0x80]
+    assert valid == [5]
