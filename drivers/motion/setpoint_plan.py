@@ -61,7 +61,7 @@ class Limits:
             ("travel", ACTUAL_POSITION, self.position_max),
             ("speed", ACTUAL_VELOCITY, self.speed_max),
             ("torque", ACTUAL_TORQUE, self.torque_max),
-            ("following error", lag, self.following_error_max),
+            ("following-error", lag, self.following_error_max),
             ("speed", ACTUAL_POSITION, compared and compared.velocity_per_inc_s),
             ("speed", ACTUAL_VELOCITY, compared and compared.velocity_per_inc_s),
         ):

@@ -91,6 +91,26 @@ def test_a_limit_of_the_following_error_without_anything_to_compute_it_from_is_r
     assert bench.axis.phase is Phase.PLAYING
 
 
+@pytest.mark.parametrize(
+    ("limits", "english", "chinese"),
+    [
+        (Limits(position_max=1), "the travel limit", "无法监视行程限值"),
+        (Limits(position_min=1), "the travel limit", "无法监视行程限值"),
+        (Limits(speed_max=1), "the speed limit", "无法监视速度限值"),
+        (Limits(torque_max=1), "the torque limit", "无法监视转矩限值"),
+        (Limits(following_error_max=1), "the following error limit", "无法监视跟随误差限值"),
+    ],
+)
+def test_a_limit_that_cannot_be_watched_is_named_in_the_readers_language(
+    limits: Limits, english: str, chinese: str
+) -> None:
+    """The Chinese sentence had the English name of the limit in it."""
+    with pytest.raises(NotAllowed) as refused:
+        limits.require_watched((), "station 1")
+    assert f"station 1: {english} cannot be watched, 60" in refused.value.text.words()
+    assert chinese in refused.value.text.words("zh")
+
+
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_ramp_ends_at_the_limit_of_the_type_and_the_axis_is_disabled(sign: int) -> None:
     begin = sign * (2**31 - 1 - 20_000)

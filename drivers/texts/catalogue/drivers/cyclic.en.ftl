@@ -3,7 +3,12 @@ cyclic_braking = { $where } is braking: { $why }
     .remedy = wait for standstill
 cyclic_cycle-cannot-reported-drive = a cycle of { NUM($cycle_us, format: "g") } µs cannot be commanded to the drive
     .remedy = choose another cycle, such as 1 ms
-cyclic_limit-cannot-watched-not = { $where }: the { $name } limit cannot be watched, { NUM($index, format: "04X") }h is not mapped
+cyclic_limit-cannot-watched-not = { $where }: the { $name ->
+    [travel] travel
+    [speed] speed
+    [torque] torque
+   *[following-error] following error
+ } limit cannot be watched, { NUM($index, format: "04X") }h is not mapped
     .remedy = configure the cyclic data with { NUM($index, format: "04X") }h
 cyclic_mode-setpoint-needs-mode = { $where } is in mode { $mode }, this setpoint needs mode { $wanted } ({ $mode_names })
     .remedy = choose the mode when enabling the axis

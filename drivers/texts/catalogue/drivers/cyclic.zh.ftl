@@ -3,7 +3,12 @@ cyclic_braking = { $where } 正在制动：{ $why }
     .remedy = 请等待其静止
 cyclic_cycle-cannot-reported-drive = 无法向驱动器设置 { NUM($cycle_us, format: "g") } µs 的周期
     .remedy = 请选择其他周期，如 1 ms
-cyclic_limit-cannot-watched-not = { $where }：无法监视{ $name }限值，未映射 { NUM($index, format: "04X") }h
+cyclic_limit-cannot-watched-not = { $where }：无法监视{ $name ->
+    [travel] 行程
+    [speed] 速度
+    [torque] 转矩
+   *[following-error] 跟随误差
+ }限值，未映射 { NUM($index, format: "04X") }h
     .remedy = 请将 { NUM($index, format: "04X") }h 配置到周期数据中
 cyclic_mode-setpoint-needs-mode = { $where } 处于模式 { $mode }，此设定值需要模式 { $wanted }（{ $mode_names }）
     .remedy = 请在使能轴时选择模式
