@@ -132,9 +132,14 @@ class EthercatLink:
 
     async def close(self) -> None:
         """Brake, leave OP, end the host. Further calls have no effect."""
-        await self.process_data.close()
-        await self._host.stop()
-        await self.recorder.stop()
+        try:
+            await self.process_data.close()
+        finally:
+            # Also where the caller was cancelled meanwhile, as in `open`.
+            try:
+                await self._host.stop()
+            finally:
+                await self.recorder.stop()
 
     async def scan(
         self,

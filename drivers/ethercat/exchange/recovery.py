@@ -9,10 +9,10 @@ motions that ran before have ended.
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections.abc import Awaitable, Callable
 
 from drivers.errors import DriveError
+from drivers.ethercat.process.ending import end_task
 from drivers.texts.message import Text, text
 
 PAUSES_S = (0.3, 1.0, 3.0, 10.0)
@@ -54,9 +54,7 @@ class Recovery:
         task, self._task = self._task, None
         self.trouble = None
         if task is not None and task is not asyncio.current_task():
-            task.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await task
+            await end_task(task)
 
     async def _run(self) -> None:
         last: Text | None = None

@@ -177,7 +177,13 @@ class EthercatCyclic:
     async def stop(self) -> None:
         """Brake moving axes, disable, leave Operational; no restart is attempted afterwards."""
         broken = self._recovery.active
-        await self._forget()
+        try:
+            await self._forget()
+        finally:
+            # Also where the caller was cancelled meanwhile: an exchange would go on unwanted.
+            await self._stop(broken=broken)
+
+    async def _stop(self, *, broken: bool) -> None:
         try:
             await self._host.call({"op": "stop"}, _STOP_S)
         except LinkLost:
@@ -338,8 +344,10 @@ class EthercatCyclic:
 
     async def close(self) -> None:
         """End the exchange because the bus is being closed."""
-        await self._forget()
-        self.shut_down()
+        try:
+            await self._forget()
+        finally:
+            self.shut_down()
 
     def shut_down(self) -> None:
         """Stop delivering samples."""

@@ -17,6 +17,7 @@ from drivers.errors import DriveError, LinkLost, LinkTimeout, why_of
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol
 from drivers.ethercat.process.channel import PipeServerEnd, ServerEnd, SocketServerEnd
+from drivers.ethercat.process.ending import end_task
 from drivers.ethercat.process.protocol import Message
 from drivers.link import Progress
 from drivers.texts.message import Text, text
@@ -102,13 +103,14 @@ class HostProcess:
     async def stop(self) -> None:
         """End the child in an orderly way, by force after some seconds."""
         self._wanted = False
-        if self._care is not None:
-            self._care.cancel()
-            with contextlib.suppress(asyncio.CancelledError):
-                await self._care
+        try:
+            if self._care is not None:
+                await end_task(self._care)
+        finally:
+            # Also where the caller was cancelled meanwhile: the child would keep the interface.
             self._care = None
-        await self._end(kill=False)
-        self.why = text("ethercat.process-closed")
+            await self._end(kill=False)
+            self.why = text("ethercat.process-closed")
 
     async def call(
         self, message: Message, timeout_s: float, progress: Progress | None = None
