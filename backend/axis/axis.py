@@ -7,6 +7,7 @@ Their cleanup is shielded from cancellation, has a deadline, and reports what it
 from __future__ import annotations
 
 import asyncio
+import itertools
 import math
 import time
 from collections.abc import AsyncIterator, Callable
@@ -30,6 +31,16 @@ from drivers.texts.message import Text, text
 from profiles.schema import Raw
 
 __all__ = ["Axis", "Envelope"]
+
+#: An axis that is halted through the loop stands within this time, s.
+_HALT_S = 2.0
+#: Further time for one that its drive brakes on a longer ramp, s.
+_RAMP_S = 1.5
+#: Time in which one stands that lost its power while it moved, s.
+_COAST_S = 0.5
+#: Looks at a moving axis and the time between them [s]; it slows down where its speed at their end
+#: is below this part of that at their beginning.
+_LOOKS, _LOOK_S, _SLOWER = 5, 0.15, 0.97
 
 
 class Axis(ScaledAxis):
@@ -137,11 +148,15 @@ class Axis(ScaledAxis):
         await self.quick_stop()
         await self._require_rest(timeout_s)
 
-    async def _require_rest(self, timeout_s: float) -> None:
-        """Raise LinkTimeout where the axis still moves after a quick stop."""
+    async def _require_rest(self, timeout_s: float, stopped_s: float | None = None) -> None:
+        """Raise LinkTimeout where the axis still moves after a quick stop.
+
+        ``stopped_s``: when it was stopped (`time.monotonic`), if that was before this call.
+        """
         if not await self.standstill(timeout_s):
+            passed_s = timeout_s if stopped_s is None else round(time.monotonic() - stopped_s, 1)
             raise LinkTimeout(
-                "axis.still-moves-after-quick", drive=self.drive.name, timeout_s=timeout_s
+                "axis.still-moves-after-quick", drive=self.drive.name, timeout_s=passed_s
             )
 
     async def standstill(self, timeout_s: float) -> bool:
@@ -284,6 +299,8 @@ class Axis(ScaledAxis):
         """Brake and switch the power off through the loop, shielded from cancellation.
 
         Raises:
+            LinkTimeout: the axis did not come to rest. One that still slows down in a quick stop
+                keeps its power.
             DriveError: the loop did not do so. A stop is pending then, as the axis may still move.
         """
         try:
@@ -298,10 +315,30 @@ class Axis(ScaledAxis):
             # to the drive.
             self.stop_pending = self.stop_pending or bool(session.trouble)
             return
+        stopped_s = time.monotonic()
         await session.cyclic.halt(session.station(self.drive))
-        await self.standstill(2.0)
-        if await self.state() not in (State.FAULT, State.FAULT_REACTION):
-            await self.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, timeout_s=5.0)
+        rests = await self.standstill(_HALT_S)
+        state = await self.state()
+        if state in (State.FAULT, State.FAULT_REACTION):
+            return
+        if not rests and state is State.QUICK_STOP_ACTIVE and await self._slows_down():
+            # Its drive brakes on a long ramp: without power the axis would coast.
+            await self._require_rest(_RAMP_S, stopped_s)
+        # One that neither stands nor slows down loses its power, as after STOP: the loop waits
+        # once more for its standstill.
+        await self.go_to_cyclic(session, State.SWITCH_ON_DISABLED, None, timeout_s=5.0)
+        if not rests and state in (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE):
+            await self._require_rest(_COAST_S, stopped_s)
+
+    async def _slows_down(self) -> bool:
+        """Whether the axis moves in one direction and becomes slower."""
+        seen = [(time.monotonic(), await self.position_raw())]
+        while len(seen) < _LOOKS:
+            await asyncio.sleep(_LOOK_S)
+            seen.append((time.monotonic(), await self.position_raw()))
+        speeds = [(q - p) / (t - s) for (s, p), (t, q) in itertools.pairwise(seen)]
+        one_way = all(v > 0 for v in speeds) or all(v < 0 for v in speeds)
+        return one_way and abs(speeds[-1]) < _SLOWER * abs(speeds[0])
 
     async def restorable_mode(self) -> list[str]:
         """Key of 6060h; none where the drive shows a mode that cannot be written (power-on)."""

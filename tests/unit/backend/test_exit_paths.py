@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,7 @@ from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.texts.message import Text, text
-from tests.support.servo import STATUS, URL, Servo
+from tests.support.servo import POSITION, STATUS, URL, Servo
 
 ENABLED = 0x237
 JOG = JogSettings(1, 60.0, 600.0, 5.0, 50.0)
@@ -238,6 +239,85 @@ async def test_an_exchange_that_was_ended_in_order_owes_none(x: ConnectedDrive) 
     loop.running = False
     await x.axis.leave_cyclic(loop, 1.0)  # type: ignore[arg-type]
     assert not x.axis.stop_pending
+
+
+class QuickStopping(Loop):
+    """The halt ends in ``state``, and the axis has the power until it is disabled."""
+
+    def __init__(self, x: ConnectedDrive, servo: Servo, state: int) -> None:
+        super().__init__(x)
+        self._servo, self._state = servo, state
+
+    async def halt(self, _station: int) -> None:
+        self._servo.set(STATUS, self._state)
+
+    async def drive_to(self, station: int, goal: State, mode: int | None = None) -> None:
+        await super().drive_to(station, goal, mode)
+        self._servo.set(STATUS, 0x250)
+
+
+QUICK_STOP = 0x217
+
+
+def long_ramp(passed_s: float, _reads: int, _off: bool) -> float:
+    return 40e6 * passed_s - 8e6 * passed_s**2
+
+
+def oscillates(_passed_s: float, reads: int, off: bool) -> float:
+    return 0.0 if off else 5000.0 * (-1) ** reads
+
+
+def falls(passed_s: float, _reads: int, off: bool) -> float:
+    return 0.0 if off else 1e6 + 8e6 * passed_s**2
+
+
+def runs_on(passed_s: float, _reads: int, _off: bool) -> float:
+    return 10e6 * passed_s
+
+
+@pytest.mark.parametrize(
+    ("course", "state", "goals", "refused"),
+    [
+        (long_ramp, QUICK_STOP, [], True),
+        (oscillates, QUICK_STOP, [State.SWITCH_ON_DISABLED], False),
+        (falls, QUICK_STOP, [State.SWITCH_ON_DISABLED], False),
+        (runs_on, QUICK_STOP, [State.SWITCH_ON_DISABLED], True),
+        (runs_on, ENABLED, [State.SWITCH_ON_DISABLED], True),
+        # Without power before: its load swings, and nothing is taken from it.
+        (runs_on, 0x231, [State.SWITCH_ON_DISABLED], False),
+    ],
+)
+async def test_an_axis_that_its_drive_still_brakes_keeps_its_power(
+    x: ConnectedDrive,
+    servo: Servo,
+    monkeypatch: pytest.MonkeyPatch,
+    course: Callable[[float, int, bool], float],
+    state: int,
+    goals: list[State],
+    refused: bool,
+) -> None:
+    """It coasted on from 2 s after the halt, and its motion ended as if nothing was."""
+    for name, seconds in (("_HALT_S", 0.1), ("_RAMP_S", 0.1), ("_COAST_S", 0.1)):
+        monkeypatch.setattr(f"backend.axis.axis.{name}", seconds)
+    began_s, reads = time.monotonic(), 0
+
+    def moves(place: tuple[int, int]) -> None:
+        nonlocal reads
+        if place == POSITION:
+            reads += 1
+            off = servo.number(STATUS) == 0x250
+            servo.set(POSITION, round(course(time.monotonic() - began_s, reads, off)))
+
+    servo.enable()
+    servo.on_read = moves
+    loop = QuickStopping(x, servo, state)
+    if refused:
+        with pytest.raises(LinkTimeout, match="still moves"):
+            await x.axis.leave_cyclic(loop, 5.0)  # type: ignore[arg-type]
+    else:
+        await x.axis.leave_cyclic(loop, 5.0)  # type: ignore[arg-type]
+    assert loop.goals == goals
+    assert stop_pending(x) is refused
 
 
 # --- settings that change together --------------------------------------------------------
