@@ -56,6 +56,53 @@ def test_a_damaged_file_is_reported_and_not_fatal(tmp_path: Path) -> None:
         assert "无法读取" in problems[0].words("zh")
 
 
+@pytest.mark.parametrize("damage", ["whole", "entry", "no list"])
+def test_a_damaged_list_is_kept_under_another_name(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "bench.json"
+    drives = DriveList(path)
+    for number in (1, 2):
+        drives.store([X, Z])
+        content = json.loads(path.read_text("utf-8"))
+        content["drives"][number - 1]["profile"] = number
+        as_list = json.dumps(content)
+        damaged = {"whole": as_list[:-9], "entry": as_list, "no list": '{"drives": 0}'}[damage]
+        path.write_text(damaged, "utf-8")
+        # Starts alone change nothing.
+        for _ in range(2):
+            drives = DriveList(path)
+            loaded, problems = drives.load()
+            assert len(problems) == number, "the damage, and every earlier list that is kept"
+        drives.store(loaded)
+        drives.store([X])
+        aside = tmp_path / ("bench.json.damaged" + ("" if number == 1 else "-2"))
+        assert aside.read_text("utf-8") == damaged
+    again, problems = DriveList(path).load()
+    assert again == [X]
+    assert [str(tmp_path / "bench.json.damaged") in each.words() for each in problems] == [True] * 2
+    assert "已保留" in problems[0].words("zh")
+
+
+def test_a_damaged_list_that_cannot_be_kept_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bench.json"
+    path.write_text("[", "utf-8")
+    drives = DriveList(path)
+    drives.load()
+
+    def refused(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "hardlink_to", refused)
+        patch.setattr(Path, "rename", refused)
+        with pytest.raises(StorageFailed):
+            drives.store([X])
+    assert path.read_text("utf-8") == "["
+    drives.store([X])
+    assert drives.load()[0] == [X]
+
+
 async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) -> None:
     """As on a full disk: bench.json cannot be written, here because a folder is in its place."""
     (tmp_path / "bench.json").mkdir()
