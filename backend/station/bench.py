@@ -321,11 +321,15 @@ class Bench:
         return moved or self.authority.grant_of(drive_id) is not None
 
     async def remove(self, drive_id: str) -> None:
-        """Remove a drive from the bench.
+        """Remove a drive from the bench, or one from its list that could not be connected.
 
         Raises:
             Busy: it is moving, or another axis moves through the exchange that would end with it.
+            StorageFailed: it was not connected, and the list could not be stored.
         """
+        if (missing := self.missing(drive_id)) is not None:
+            self._remove_missing(missing)
+            return
         connected = self.connected(drive_id)
         self.motion.require_stays(connected)
         self.motion.require_idle(connected)
@@ -353,6 +357,22 @@ class Bench:
         await connected.monitor.close()
         self._remember()
         self.drives_changed()
+
+    def missing(self, drive_id: str) -> SavedDrive | None:
+        """The drive of the list with this id that could not be connected; None without one."""
+        if self._restoring or drive_id in self.connected_drives:
+            return None
+        return next((each for each in self._unreached if each.id == drive_id), None)
+
+    def _remove_missing(self, missing: SavedDrive) -> None:
+        before = self._unreached
+        self._unreached = [each for each in before if each is not missing]
+        try:
+            self._save()
+        except StorageFailed:
+            self._unreached = before
+            raise
+        self._parted(missing.id)
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> ConnectedDrive:
         """Change name or notes; None leaves them unchanged.
@@ -404,9 +424,12 @@ class Bench:
         self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
-        """Name of a drive; its id where it is not connected."""
+        """Name of a drive; its id where it is not in the list."""
         connected = self.connected_drives.get(drive_id)
-        return connected.drive.name if connected is not None else drive_id
+        if connected is not None:
+            return connected.drive.name
+        missing = self.missing(drive_id)
+        return missing.name if missing is not None else drive_id
 
     def drives_changed(self) -> None:
         """Notify all listeners that the list of drives or buses may have changed."""
@@ -518,6 +541,8 @@ class Bench:
             )
         except (DriveError, ProfileError) as error:
             self._not_connected(item, error)
+            line = text("journal.stays-in-list", drive=item.name, id=item.id)
+            self.journal.add(line, level="warning")
             return
         self._unreached.remove(item)
         drive = connected.drive

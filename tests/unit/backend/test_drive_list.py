@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from backend.api.errors import NotFound
+from backend.api.station.routes import remove_drive
 from backend.axis.remembered import AxisRecord
 from backend.scales.scale import ScaleUnknown
 from backend.scales.taught import Taught
@@ -183,6 +185,46 @@ async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Pa
     await bench.connect("mlink://virtual0", 1, "mms7", "Z")
     await bench.close()
     assert sorted(each.name for each in drives.load()[0]) == ["Y", "Z"]
+
+
+async def test_a_drive_that_is_gone_for_good_can_be_removed(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    saved = [
+        SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), id="x"),
+        SavedDrive("Y", "mms7", (SavedPort("mlink://virtual1", 1),), id="y"),
+    ]
+    drives.store(saved)
+    bench = _bench(tmp_path, "mlink://virtual0")
+    bench.axis_records.put("x", AxisRecord(scales=Taught(counts_per_rev=1000.0)))
+    await bench.restore()
+    try:
+        lines = [e.text for e in bench.journal.entries() if e.level == "warning"]
+        assert any("servodeck station forget x" in line for line in lines)
+        answer = await remove_drive(bench, "x")
+        assert answer.status_code == 204
+        assert [each.id for each in drives.load()[0]] == ["y"]
+        assert bench.axis_records.get("x").scales is None
+        with pytest.raises(NotFound):
+            await remove_drive(bench, "x")
+        await remove_drive(bench, "y")
+        assert drives.load() == ([], [])
+    finally:
+        await bench.close()
+
+
+async def test_a_missing_drive_stays_where_the_list_cannot_be_stored(tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+    DriveList(path).store([SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), id="x")])
+    bench = _bench(tmp_path, "mlink://virtual0")
+    await bench.restore()
+    path.unlink()
+    path.mkdir()
+    try:
+        with pytest.raises(StorageFailed):
+            await remove_drive(bench, "x")
+        assert bench.missing("x") is not None
+    finally:
+        await bench.close()
 
 
 async def test_a_bench_may_have_many_drives(tmp_path: Path) -> None:

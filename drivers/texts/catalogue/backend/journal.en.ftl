@@ -102,6 +102,7 @@ journal_set-imported = imported { $file }: { $count } parameters
 journal_set-saved = { $drive }: saved { $file }{ $missing }
 journal_small-move = { $drive }: small move by { $increments } increments
 journal_stays-as-it-is = { $drive }: { $key } keeps its present value (was { $before })
+journal_stays-in-list = { $drive }: it stays in the list of drives for the next start. If it is gone for good, remove it: servodeck station forget { $id }
 journal_terminal-off = { $terminal } off
 journal_terminal-on = { $terminal } on
 journal_terminal-released = { $terminal } released

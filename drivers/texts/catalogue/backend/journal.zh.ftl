@@ -99,6 +99,7 @@ journal_set-imported = 已导入 { $file }：{ $count } 个参数
 journal_set-saved = { $drive }：已保存 { $file }{ $missing }
 journal_small-move = { $drive }：小幅移动 { $increments } 个增量
 journal_stays-as-it-is = { $drive }：{ $key } 保持现值（原为 { $before }）
+journal_stays-in-list = { $drive }：它保留在驱动器列表中，供下次启动使用。如果它已永久拆除，请将其删除：servodeck station forget { $id }
 journal_terminal-off = { $terminal } 断开
 journal_terminal-on = { $terminal } 接通
 journal_terminal-released = { $terminal } 已释放
