@@ -76,6 +76,7 @@ printed_no-lss-node = no node with layer setting services answers at this bit ra
 printed_no-name = no name
 printed_no-number = no number
 printed_no-serial = no serial number
+printed_no-station-answers = no station answers: check { $check }
 printed_not-compared = not compared, neither set nor drive gives a value: { $keys }
 printed_not-granted = not granted
 printed_not-locked = not locked

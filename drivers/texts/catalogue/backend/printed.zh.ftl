@@ -73,6 +73,7 @@ printed_no-lss-node = 在此位速率下没有支持层设置服务的节点应�
 printed_no-name = 无名称
 printed_no-number = 无编号
 printed_no-serial = 无序列号
+printed_no-station-answers = 没有站应答：请检查 { $check }
 printed_not-compared = 未比较，参数集和驱动器都没有值：{ $keys }
 printed_not-granted = 未授予
 printed_not-locked = 未锁定
