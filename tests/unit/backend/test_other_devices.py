@@ -51,7 +51,7 @@ class _Bus(MemoryLink):
         self.doctor = SimpleNamespace()  # type: ignore[assignment]
         self._stations = stations
 
-    async def scan(self, *_: object, **__: object) -> list[Found]:  # type: ignore[override]
+    async def scan(self, *_: object, **__: object) -> list[Found]:
         return [Found(n, vendor_id=_UNKNOWN, device_profile=401) for n in self._stations]
 
 
