@@ -6,17 +6,18 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from backend.axis.power import PowerState
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.motion.grant import Grant
 from backend.scales.resolve import stating_keys
-from backend.scales.scale import ScaleChanged
+from backend.scales.scale import ScaleChanged, Scales
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits, read_units
 from drivers.errors import DriveError
+from drivers.texts.message import Text
 from profiles.schema import Raw
 
 #: Time for which one motion relies on its last reading of the scales [s]. A reading takes some ten
@@ -51,6 +52,7 @@ class ScaledAxis(PowerState):
         super().__init__(drive)
         self._units: AxisUnits | None = None
         self._taught: Taught | None = None
+        self._not_used: Text | None = None
         self._unit_raws: dict[str, Raw | None] = {}
         self._planned: _Planned | None = None
         #: Objects of the scales that the drive refused as absent, until `forget_scales`.
@@ -67,6 +69,9 @@ class ScaledAxis(PowerState):
         """Units with the present gearing; read from the drive where none are known."""
         if self._units is None:
             units = await read_units(self.drive, self._taught, self._absent)
+            if self._not_used is not None:
+                stated = Scales(*(replace(s, not_used=self._not_used) for s in units.scales.all))
+                units = replace(units, stated=stated)
             known = self.drive.readings
             self._absent = frozenset(
                 key
@@ -162,9 +167,12 @@ class ScaledAxis(PowerState):
         """Scales of this axis that a person stated or confirmed."""
         return self._taught
 
-    def teach(self, taught: Taught | None) -> None:
-        """Set the scales that a person states or confirms; they apply from the next motion on."""
-        self._taught = taught
+    def teach(self, taught: Taught | None, not_used: Text | None = None) -> None:
+        """Set the scales that a person states or confirms; they apply from the next motion on.
+
+        ``not_used``: why those that are stored under the name of this axis do not count.
+        """
+        self._taught, self._not_used = taught, not_used
         self.forget_scales()
 
     def moved_small(self, moved: int, raw_per_inc_s: float | None) -> None:

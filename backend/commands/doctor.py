@@ -20,6 +20,7 @@ from drivers.doctor.trials import trials
 from drivers.errors import NotAllowed
 from drivers.link import Found, Link
 from drivers.texts.message import language
+from drivers.urls import bus_kind, parse_url
 from profiles import STANDARD, load_profile
 from profiles.schema import Profile as ProfileOf
 
@@ -46,13 +47,17 @@ def doctor(
             raise NotAllowed("command.doctor-tries-alone", value=url)
         if at:
             results = await _by_server(at, url, station)
+            answered = bool(results)
         else:
             async with opened(url) as link:
                 if link.doctor is None:
                     raise NotAllowed("station.doctor-knows-not", value=url)
-                results = await _here(link, station, profile, try_settings=try_settings)
+                results, answered = await _here(link, station, profile, try_settings=try_settings)
         _show(results, as_json=as_json)
-        return all(each["reached"] for each in results)
+        if not answered and not as_json:
+            check = bus_kind(parse_url(url).scheme).traits.silent
+            print_text("printed.no-station-answers", check=check)
+        return answered and all(each["reached"] for each in results)
 
     if not run(work):
         raise typer.Exit(1)
@@ -69,7 +74,8 @@ async def _by_server(at: str, url: str, station: int | None) -> list[dict[str, A
 
 async def _here(
     link: Link, station: int | None, profile: str | None, *, try_settings: bool
-) -> list[dict[str, Any]]:
+) -> tuple[list[dict[str, Any]], bool]:
+    """What each drive has, and whether there is any station: a bus may have other devices only."""
     found = {each.station: each for each in await link.scan(show_progress, None)}
     results = []
     # A station that was named but not found is examined as well, to find out why.
@@ -90,7 +96,7 @@ async def _here(
         if try_settings and seen.causes and chosen is not None:
             result["trials"] = await tried(link, number, chosen, seen.causes)
         results.append(result)
-    return results
+    return results, bool(found) or bool(results)
 
 
 def _fitting(kind: str, found: Found | None) -> ProfileOf | None:

@@ -140,7 +140,8 @@ def alias(
     """Write the station alias with its checksum. It counts after a power cycle."""
 
     async def work() -> None:
-        if not yes and not typer.confirm(f"write alias {value} to station {station}?"):
+        question = words_of("printed.confirm-alias", alias=str(value), station=str(station))
+        if not yes and not typer.confirm(question):
             raise NotAllowed("command.eeprom-not-confirmed")
         if at := server_for(url, server):
             from backend.commands.remote import remote
@@ -237,7 +238,7 @@ def _confirmed(shown: _Shown, confirm: str | None, yes: bool) -> bool:
     given = confirm or typer.prompt(words_of("printed.type-digest")).strip()
     if given != shown.digest:
         raise NotAllowed("ethercat.eeprom-plan-changed", digest=shown.digest)
-    if not yes and not typer.confirm("write it now? Do not switch anything off until it is done"):
+    if not yes and not typer.confirm(words_of("printed.confirm-eeprom")):
         raise NotAllowed("command.eeprom-not-confirmed")
     return True
 
@@ -292,8 +293,10 @@ def _print_changes(rows: list[dict[str, Any]], first: str, second: str) -> None:
 
 def _short(data: str | None) -> str:
     if data is None:
-        return "missing"
-    return data if len(data) <= 64 else f"{data[:64]}… ({len(data) // 2} bytes)"
+        return words_of("printed.missing")
+    if len(data) <= 64:
+        return data
+    return words_of("printed.part-of-bytes", part=data[:64], count=str(len(data) // 2))
 
 
 def _print_done(shown: _Shown) -> None:

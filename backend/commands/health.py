@@ -19,6 +19,7 @@ from backend.api.station.models import DriveSummary
 from backend.commands import health_permission
 from backend.commands.keep import Config, Database, station_records
 from backend.commands.options import DEFAULT_SERVER, Json, Server
+from backend.commands.printing import words_of
 from backend.commands.remote import Remote, remote
 from backend.commands.session import run
 from backend.commands.tools import command_of, lines_of
@@ -183,7 +184,9 @@ def _numbers(runs: str) -> list[int]:
     try:
         return [int(each) for each in runs.split(",")]
     except ValueError as error:
-        raise typer.BadParameter("numbers, separated by commas", param_hint="--runs") from error
+        raise typer.BadParameter(
+            words_of("printed.numbers-by-commas"), param_hint="--runs"
+        ) from error
 
 
 def _show(
@@ -208,7 +211,13 @@ def _baseline_lines(found: AxisHealth) -> list[str]:
         return [_no_baseline(found)]
     when = f"{signed.signed:%Y-%m-%d %H:%M} UTC"
     return [
-        f"{found.axis}: baseline of {len(signed.runs)} rounds, signed {when} by {signed.person}",
+        words_of(
+            "printed.baseline-signed",
+            axis=found.axis,
+            rounds=str(len(signed.runs)),
+            when=when,
+            person=signed.person,
+        ),
         f"sha256: {signed.sha256}",
     ]
 
@@ -237,7 +246,9 @@ def _finding(each: HealthFinding) -> list[str]:
 
 
 def _trend_lines(found: AxisHealth) -> list[str]:
-    serial = "" if found.serial is None else f"  serial {found.serial}"
+    serial = ""
+    if found.serial is not None:
+        serial = f"  {words_of('printed.serial', serial=str(found.serial))}"
     lines = [f"{found.axis}  {found.profile}{serial}"]
     for row in found.runs:
         values = "  ".join(

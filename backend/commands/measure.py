@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -18,7 +18,7 @@ from backend.commands.printing import print_text
 from backend.commands.remote import Remote, remote
 from backend.commands.restoring import restore_first
 from backend.commands.session import drive_and_pending, drive_on, opened, run_in_order
-from backend.store.files import write_atomically
+from backend.store.files import StorageFailed, require_writable, write_atomically
 from backend.tools.tool import ToolSettings
 from drivers.errors import NotAllowed
 
@@ -159,16 +159,22 @@ class Where(NamedTuple):
 def measure(
     where: Where, kind: str, here: Callable[[], Awaitable[Answer]], request: Answer,
     out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool,
-    there: There | None = None,
+    there: There | None = None, files: Sequence[Path | None] = (),
+    failed: Sequence[StorageFailed] = (),
 ) -> None:  # fmt: skip
     """Measure by a server or by ``here``, then write and show the result.
 
-    ``there`` is called after a measurement by a server, with its result. Ctrl+C ends the motion
+    ``there`` is called after a measurement by a server, with its result. ``files`` are further
+    files that ``here`` and ``there`` write. All are tried before anything moves; what could not be
+    written all the same is in ``failed``, and reported after the result. Ctrl+C ends the motion
     first: see `run_in_order`.
     """
 
     async def work() -> None:
         server = where.asked
+        for file in (out, *files):
+            if file is not None:
+                require_writable(file)
         if server is None:
             answer = await here()
         else:
@@ -178,6 +184,8 @@ def measure(
                 if there is not None:
                     await there(at, drive, answer)
         show(answer, out, reported, as_json=as_json)
+        for error in failed:
+            raise error
 
     run_in_order(work)
 
@@ -185,13 +193,23 @@ def measure(
 def show(
     answer: Answer, out: Path | None, reported: Callable[[Answer], list[str]], *, as_json: bool
 ) -> None:
-    """Write a result to ``out``, and print it as JSON or as text."""
+    """Write a result to ``out``, and print it as JSON or as text.
+
+    Raises:
+        StorageFailed: it could not be written; it was printed as JSON, so that it is not lost.
+    """
+    failed: StorageFailed | None = None
     if out is not None:
-        write_atomically(out, json.dumps(answer, indent=1).encode())
-    if as_json:
+        try:
+            write_atomically(out, json.dumps(answer, indent=1).encode())
+        except StorageFailed as error:
+            failed = error
+    if not as_json:
+        for line in reported(answer):
+            print(line)
+    if as_json or failed is not None:
         print(json.dumps(answer, indent=1))
-        return
-    for line in reported(answer):
-        print(line)
-    if out is not None:
+    if failed is not None:
+        raise failed
+    if out is not None and not as_json:
         print_text("printed.written", file=str(out))

@@ -116,9 +116,9 @@ def _show_run(run: Measured) -> None:
         fifo=words_of("printed.granted" if run.fifo else "printed.not-granted"),
         memory=words_of("printed.locked" if run.memory_locked else "printed.not-locked"),
     )
-    _show_histogram("wake-up lateness", run.lateness)
+    _show_histogram(words_of("printed.wake-up-lateness"), run.lateness)
     if run.round_trip is not None:
-        _show_histogram("frame round trip", run.round_trip)
+        _show_histogram(words_of("printed.frame-round-trip"), run.round_trip)
     elif run.unanswered:
         print_text("printed.no-frame-back")
 

@@ -9,16 +9,31 @@ from typing import Annotated
 
 import typer
 
-from backend.commands.printing import print_text
+from backend.commands.printing import print_text, words_of
 from backend.commands.session import reported
 from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts import limits
+from drivers.texts.message import Text, language, text
 
 app = typer.Typer(
     help="Frequency responses from recordings of other programs. Nothing moves.",
     no_args_is_help=True,
 )
+
+_KINDS = {
+    "resonance": text("health.resonance"),
+    "antiresonance": text("health.antiresonance"),
+}
+_MARKS = {
+    "robust": text("printed.mark-robust"),
+    "balanced": text("printed.mark-balanced"),
+    "fast": text("printed.mark-fast"),
+}
+_EXCITATIONS = {
+    "chirp": text("printed.by-chirp"),
+    "noise": text("printed.by-noise"),
+}
 
 
 class StructureName(StrEnum):
@@ -152,19 +167,35 @@ def _reported(answer: dict[str, object]) -> list[str]:
     for row in rows if isinstance(rows, list) else []:
         low, high = row["frequency_ci95_hz"]
         lines.append(
-            f"{row['kind']:14} {row['frequency_hz']:8.2f} Hz  ({low:.2f} … {high:.2f})  damping "
-            f"{row['damping']:.4f}"
+            words_of(
+                "printed.response-mode",
+                mode=f"{_KINDS[row['kind']].words(language()):14}",
+                frequency=f"{row['frequency_hz']:8.2f}",
+                low=f"{low:.2f}",
+                high=f"{high:.2f}",
+                damping=f"{row['damping']:.4f}",
+            )
         )
     axis = answer["axis"]
     if isinstance(axis, dict) and axis["verdict"] == "sound":
         low, high = axis["inertia_ci95"]
         lines.append(
-            f"inertia {axis['inertia']:.4g} ({low:.4g} … {high:.4g}) {axis['inertia_unit']}  "
-            f"viscous friction at this level {axis['viscous']:.3g} {axis['viscous_unit']}"
+            words_of(
+                "printed.response-inertia",
+                inertia=f"{axis['inertia']:.4g}",
+                low=f"{low:.4g}",
+                high=f"{high:.4g}",
+                unit=str(axis["inertia_unit"]),
+                viscous=f"{axis['viscous']:.3g}",
+                viscous_unit=str(axis["viscous_unit"]),
+            )
         )
         lines += [_candidate(row) for row in axis["candidates"]]
-    notes = answer["warnings"]
-    return lines + [f"note: {w}" for w in (notes if isinstance(notes, list) else [])]
+    notes = answer["warning_messages"]
+    return lines + [
+        words_of("printed.note", words=Text.from_wire(each))
+        for each in (notes if isinstance(notes, list) else [])
+    ]
 
 
 def _candidate(row: dict[str, object]) -> str:
@@ -173,9 +204,12 @@ def _candidate(row: dict[str, object]) -> str:
     assert isinstance(notches, list | tuple)
     assert isinstance(marks, list | tuple)
     shown = ", ".join(f"{n['center_hz']:.1f} Hz {n['depth_db']:.0f} dB" for n in notches)
-    return (
-        f"{'/'.join(marks):20} gain {gains['speed_nms']:.4g} per rad/s, integral "
-        f"{gains['integral_hz']:.3g} Hz, notches: {shown or 'none'}"
+    return words_of(
+        "printed.response-candidate",
+        marks=f"{'/'.join(_MARKS[mark].words(language()) for mark in marks):20}",
+        gain=f"{gains['speed_nms']:.4g}",
+        integral=f"{gains['integral_hz']:.3g}",
+        notches=shown or words_of("printed.no-notches"),
     )
 
 
@@ -184,10 +218,18 @@ def _method(answer: dict[str, object], said: dict[str, object]) -> str:
     assert isinstance(band, list)
     low, high = float(band[0]), float(band[1])
     if said["method"] == "periods":
-        how = (
-            f"periodic excitation, period {said['period_s']:.6g} s: {answer['periods_used']} "
-            f"periods used, {said['transient_periods']} left out as transient"
+        how = words_of(
+            "printed.by-periods",
+            period=f"{said['period_s']:.6g}",
+            used=str(answer["periods_used"]),
+            left=str(said["transient_periods"]),
         )
     else:
-        how = f"excitation: {said['excitation']}; local polynomial method"
-    return f"{how}; {low:.4g} … {high:.4g} Hz in {answer['unit']}"
+        how = _EXCITATIONS[str(said["excitation"])].words(language())
+    return words_of(
+        "printed.response-method",
+        how=how,
+        low=f"{low:.4g}",
+        high=f"{high:.4g}",
+        unit=str(answer["unit"]),
+    )

@@ -25,7 +25,7 @@ from backend.commands.state import state_folder
 from backend.drive.drive import Drive
 from backend.drive.identity import read_serial
 from backend.scales.scale import Scale, what_to_do
-from backend.scales.taught import Taught
+from backend.scales.taught import Taught, TaughtDrive, place_of
 from backend.store.files import write_atomically
 from drivers.texts.message import language
 
@@ -54,14 +54,33 @@ async def take_taught(axis: Axis, state: Path | None = None) -> None:
     """Set the scales of the axis that were stated earlier."""
     path = await taught_file(axis.drive, state)
     try:
-        axis.teach(Taught.model_validate_json(path.read_text("utf-8")))
+        taught = Taught.model_validate_json(path.read_text("utf-8"))
     except (OSError, ValidationError):
         # There is no readable file: the drive, its description file and its manual count.
         axis.teach(None)
+        return
+    here = await _drive_here(axis.drive)
+    # A file of an earlier version does not name the family; its name has the serial number.
+    same = here.serial is not None if taught.of is None else taught.of.is_of(here)
+    if same:
+        axis.teach(taught)
+    else:
+        axis.teach(None, taught.not_used)
+
+
+async def _drive_here(drive: Drive) -> TaughtDrive:
+    port = drive.ports[0]
+    return TaughtDrive(
+        profile=drive.profile.drive,
+        serial=await read_serial(drive),
+        places=(place_of(port.link.url, port.station),),
+    )
 
 
 async def _keep(axis: Axis, taught: Taught | None, state: Path | None) -> None:
     path = await taught_file(axis.drive, state)
+    if taught is not None:
+        taught = taught.model_copy(update={"of": await _drive_here(axis.drive)})
     axis.teach(taught)
     if taught is None:
         path.unlink(missing_ok=True)

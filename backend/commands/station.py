@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 import typer
 
+from backend.commands.options import DEFAULT_SERVER, Server
 from backend.commands.printing import print_text
+from backend.commands.remote import remote
 from backend.commands.session import run
 from backend.commands.state import state_folder
 from backend.station.box.kept import Box, keep, read
@@ -62,6 +65,20 @@ def show(config: Config = None) -> None:
         for one in network_interfaces():
             found = addresses_of(one.name)
             print_text("printed.box-port", name=one.name, addresses=", ".join(found) or "-")
+
+    run(work)
+
+
+@app.command("forget")
+def forget(
+    drive: Annotated[str, typer.Argument(help="its id, as the station's log names it")],
+    server: Server = None,
+) -> None:
+    """Remove a drive from the list of a running server, also one that it could not connect."""
+
+    async def work() -> None:
+        async with remote(server or DEFAULT_SERVER) as at:
+            await at.raw("DELETE", f"/drives/{quote(drive, safe='')}")
 
     run(work)
 

@@ -22,6 +22,7 @@ from backend.commands.options import Json, Server
 from backend.commands.printing import table
 from backend.commands.remote import Remote
 from backend.commands.session import progress
+from backend.store.files import StorageFailed
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
 from drivers.texts.message import language, text
@@ -61,6 +62,8 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
     def command(**given: Any) -> None:
         settings = _settings(tool, extras.settled(given) if extras else given)
         where = measure.Where(*(given[name] for name in _WHERE))
+        # A file that cannot be written must not lose the result of a motion.
+        failed: list[StorageFailed] = []
 
         async def here() -> dict[str, object]:
             if not tool.motion:
@@ -85,20 +88,27 @@ def command_of(tool: AnyTool, extras: CommandExtras | None = None) -> Callable[.
             ) as (axis, session):
                 found = await tool.run(Run(axis, session, progress()), settings)
                 if extras is not None:
-                    await extras.here(axis, found, given)
+                    try:
+                        await extras.here(axis, found, given)
+                    except StorageFailed as error:
+                        failed.append(error)
             return dict(found.model_dump(mode="json"))
 
         async def there(at: Remote, drive: DriveSummary, answer: Answer) -> None:
             if extras is not None:
-                await extras.there(at, drive, answer, given)
+                try:
+                    await extras.there(at, drive, answer, given)
+                except StorageFailed as error:
+                    failed.append(error)
 
         def lines(answer: Answer) -> list[str]:
             found = tool.result.model_validate(answer)
-            return lines_of(tool, found) + (extras.lines(found, given) if extras else [])
+            more = extras.lines(found, given) if extras and not failed else []
+            return lines_of(tool, found) + more
 
         measure.measure(
             where, tool.kind, here, settings.model_dump(mode="json"), given["out"], lines,
-            as_json=given["as_json"], there=there,
+            as_json=given["as_json"], there=there, files=(given.get("table"),), failed=failed,
         )  # fmt: skip
 
     command.__name__, command.__doc__ = tool.kind, tool.text("help")

@@ -250,12 +250,20 @@ class RecordingLibrary:
         return path.stat().st_size + sum(e.stat().st_size for e in exports if e.is_file())
 
     def _remarks(self, path: Path) -> Remarks:
-        content = _read_json(path.with_name(path.name + _NOTES))
+        """Remarks on a recording; where they cannot be read, it counts as kept."""
+        try:
+            content = json.loads(path.with_name(path.name + _NOTES).read_text("utf-8"))
+        except FileNotFoundError:
+            return Remarks()
+        except (OSError, ValueError):
+            return Remarks(kept=True)
+        if not isinstance(content, dict):
+            return Remarks(kept=True)
         tags = content.get("tags", [])
         return Remarks(
             notes=str(content.get("notes", "")),
             tags=tuple(str(tag) for tag in tags) if isinstance(tags, list) else (),
-            kept=content.get("kept") is True,
+            kept=content.get("kept", False) is not False,
         )
 
     def _read_retention(self) -> Retention:

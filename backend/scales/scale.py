@@ -82,7 +82,7 @@ class Scale:
 
     ``raw_per_unit``: increments per revolution, or raw per rpm or rpm/s; None where not certain.
     ``raw_unit``: name of one raw step ("inc", "0.1 rpm"), empty where unknown. ``source``: objects,
-    file or place in the manual.
+    file or place in the manual. ``not_used``: why the scales that a person stated do not count.
     """
 
     quantity: Quantity
@@ -91,6 +91,7 @@ class Scale:
     origin: Origin
     source: str = ""
     uncertainty: Uncertainty | None = None
+    not_used: Text | None = None
 
     @property
     def certain(self) -> bool:
@@ -100,7 +101,12 @@ class Scale:
     @property
     def why(self) -> Text | None:
         """Why it is not certain, as a part of a sentence; None where it is certain."""
-        return None if self.uncertainty is None else text(_WHY[self.uncertainty])
+        if self.uncertainty is None:
+            return None
+        why = text(_WHY[self.uncertainty])
+        if self.not_used is None:
+            return why
+        return text("scales.why-and-not-used", why=why, not_used=self.not_used)
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from backend.library.measurements import MeasurementStore
 from backend.motion.authority import MotionAuthority
 from backend.people.lease import Leases
 from backend.restore.store import RestoreStore
+from backend.scales.taught import TaughtDrive, place_of
 from backend.scope.hub import ScopeHub
 from backend.station.buses import Buses
 from backend.station.connected_drive import ConnectedDrive
@@ -148,8 +149,11 @@ class Bench:
         *,
         found: Found | None = None,
         drive_id: str = "",
+        serial: int | None = None,
     ) -> ConnectedDrive:
         """Add the drive at a station to the bench, with this id or a new one.
+
+        ``serial``: its serial number by the list of drives.
 
         Raises:
             Busy: another drive uses this station.
@@ -177,7 +181,7 @@ class Bench:
             drive_id, name or drive_id, facts, [Port(link, station, spec)], self.authority
         )
         drive.found = found
-        return self._add(drive)
+        return self._add(drive, serial)
 
     async def add_port(
         self,
@@ -233,7 +237,7 @@ class Bench:
                     station=station,
                 )
 
-    def _add(self, drive: Drive) -> ConnectedDrive:
+    def _add(self, drive: Drive, serial: int | None) -> ConnectedDrive:
         axis = Axis(drive)
         places = {(self.buses.url_of(port), port.station) for port in drive.ports}
         axis.stop_pending = bool(places & self._unstopped)
@@ -241,7 +245,6 @@ class Bench:
         axis.scales_changed = partial(self.motion.scales_changed, drive.id)
         self._unstopped -= places
         drive_id = drive.id
-        axis.teach(self.axis_records.get(drive_id).scales)
         monitor = Monitor(
             axis,
             self.journal,
@@ -257,12 +260,57 @@ class Bench:
         drive.listeners.add_refusals(self.recorder.refused)
         drive.pending_restores.listen(self.drives_changed)
         self.reconnection.begin(axis)
+        self._take_scales(axis, serial)
         monitor.start()
         self._remember()
         line = text("journal.connected", drive=drive.name, profile_title=drive.profile.title)
         self.journal.add(line, drive=drive_id)
         self.drives_changed()
         return connected
+
+    def taught_drive(self, drive: Drive, serial: int | None = None) -> TaughtDrive:
+        """What is known of a drive, to tell whether scales were stated for it."""
+        found = drive.found
+        return TaughtDrive(
+            profile=drive.profile.drive,
+            serial=(found.serial if found is not None else None) or serial,
+            places=tuple(place_of(port.url, port.station) for port in self._ports_of(drive)),
+        )
+
+    def _take_scales(self, axis: Axis, serial: int | None) -> None:
+        """Set the scales stated for this drive; those of another one with its id are not used."""
+        drive = axis.drive
+        taught = self.axis_records.get(drive.id).scales
+        if taught is None:
+            return
+        if taught.of is not None and taught.of.is_of(self.taught_drive(drive, serial)):
+            axis.teach(taught)
+            return
+        axis.teach(None, taught.not_used)
+        line = text("journal.scales-not-used", drive=drive.name, not_used=taught.not_used)
+        self.journal.add(line, level="warning", drive=drive.id)
+        if taught.of is None:
+            # Of an earlier version, for a drive that is in the list no more: at the next start
+            # they would be taken for those of this drive.
+            self._forget_scales(drive.id)
+
+    def _forget_scales(self, drive_id: str) -> None:
+        """Remove stored scales; a failure is logged."""
+        record = self.axis_records.get(drive_id)
+        try:
+            self.axis_records.put(drive_id, record.model_copy(update={"scales": None}))
+        except StorageFailed as error:
+            line = text("journal.scales-not-removed", drive=drive_id, cause=error.text)
+            self.journal.add(line, level="error")
+
+    def _parted(self, drive_id: str) -> None:
+        """A drive leaves the list: without a serial number its scales cannot be told from others'.
+
+        The next drive of this name at this place may be another one.
+        """
+        taught = self.axis_records.get(drive_id).scales
+        if taught is not None and (taught.of is None or taught.of.serial is None):
+            self._forget_scales(drive_id)
 
     def _may_turn(self, drive_id: str) -> bool:
         """Whether this axis may turn: it is moved by a job, under a grant, or being stopped."""
@@ -273,11 +321,15 @@ class Bench:
         return moved or self.authority.grant_of(drive_id) is not None
 
     async def remove(self, drive_id: str) -> None:
-        """Remove a drive from the bench.
+        """Remove a drive from the bench, or one from its list that could not be connected.
 
         Raises:
             Busy: it is moving, or another axis moves through the exchange that would end with it.
+            StorageFailed: it was not connected, and the list could not be stored.
         """
+        if (missing := self.missing(drive_id)) is not None:
+            self._remove_missing(missing)
+            return
         connected = self.connected(drive_id)
         self.motion.require_stays(connected)
         self.motion.require_idle(connected)
@@ -301,9 +353,26 @@ class Bench:
             connected.drive.pending_restores.settle(
                 [entry.key for entry in connected.drive.pending_restores.entries]
             )
+            self._parted(drive_id)
         await connected.monitor.close()
         self._remember()
         self.drives_changed()
+
+    def missing(self, drive_id: str) -> SavedDrive | None:
+        """The drive of the list with this id that could not be connected; None without one."""
+        if self._restoring or drive_id in self.connected_drives:
+            return None
+        return next((each for each in self._unreached if each.id == drive_id), None)
+
+    def _remove_missing(self, missing: SavedDrive) -> None:
+        before = self._unreached
+        self._unreached = [each for each in before if each is not missing]
+        try:
+            self._save()
+        except StorageFailed:
+            self._unreached = before
+            raise
+        self._parted(missing.id)
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> ConnectedDrive:
         """Change name or notes; None leaves them unchanged.
@@ -355,9 +424,12 @@ class Bench:
         self.drives_changed()
 
     def name_of(self, drive_id: str) -> str:
-        """Name of a drive; its id where it is not connected."""
+        """Name of a drive; its id where it is not in the list."""
         connected = self.connected_drives.get(drive_id)
-        return connected.drive.name if connected is not None else drive_id
+        if connected is not None:
+            return connected.drive.name
+        missing = self.missing(drive_id)
+        return missing.name if missing is not None else drive_id
 
     def drives_changed(self) -> None:
         """Notify all listeners that the list of drives or buses may have changed."""
@@ -413,7 +485,9 @@ class Bench:
         ]
         # Whoever connects another drive at the same place has replaced the one of the list.
         taken = {port for drive in here for port in drive.ports}
-        self._unreached = [each for each in self._unreached if not taken & set(each.ports)]
+        for each in [each for each in self._unreached if taken & set(each.ports)]:
+            self._unreached.remove(each)
+            self._parted(each.id)
         self._list.store([*here, *self._unreached])
 
     def _ports_of(self, drive: Drive) -> tuple[SavedPort, ...]:
@@ -432,20 +506,43 @@ class Bench:
             self.journal.add(problem, level="error")
         self._restoring = True
         self._unreached = _with_ids(saved)
+        self._own_scales()
         try:
             for item in list(self._unreached):
                 await self._restore_drive(item)
         finally:
             self._restoring = False
 
+    def _own_scales(self) -> None:
+        """State in scales of earlier versions the drive of the list that they were used for."""
+        for item in self._unreached:
+            record = self.axis_records.get(item.id)
+            if record.scales is None or record.scales.of is not None:
+                continue
+            of = TaughtDrive(
+                profile=item.profile,
+                serial=item.serial,
+                places=tuple(place_of(port.url, port.station) for port in item.ports),
+            )
+            scales = record.scales.model_copy(update={"of": of})
+            with contextlib.suppress(StorageFailed):
+                self.axis_records.put(item.id, record.model_copy(update={"scales": scales}))
+
     async def _restore_drive(self, item: SavedDrive) -> None:
         first, *others = item.ports
         try:
             connected = await self.connect(
-                first.url, first.station, item.profile, item.name, drive_id=item.id
+                first.url,
+                first.station,
+                item.profile,
+                item.name,
+                drive_id=item.id,
+                serial=item.serial,
             )
         except (DriveError, ProfileError) as error:
             self._not_connected(item, error)
+            line = text("journal.stays-in-list", drive=item.name, id=item.id)
+            self.journal.add(line, level="warning")
             return
         self._unreached.remove(item)
         drive = connected.drive

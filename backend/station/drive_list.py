@@ -9,11 +9,12 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from backend.store.files import write_atomically
+from backend.store.files import StorageFailed, write_atomically
 from drivers.texts.message import Text, Unsuitable, prose, text
 from drivers.texts.validation import reason_of
 
 VERSION = 1
+_DAMAGED = ".damaged"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,26 +52,44 @@ class DriveList:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        #: Whether the file has something that was not loaded, so that it must not be lost.
+        self._damaged = False
 
     def store(self, drives: Iterable[SavedDrive]) -> None:
-        """Replace the file atomically."""
+        """Replace the file atomically; a damaged one is kept under another name.
+
+        Raises:
+            StorageFailed: it cannot be written, or the damaged one cannot be kept.
+        """
+        if self._damaged:
+            self._set_aside()
+            self._damaged = False
         content = {"version": VERSION, "drives": [asdict(drive) for drive in drives]}
         written = json.dumps(content, indent=2, ensure_ascii=False)
         write_atomically(self._path, written.encode())
 
     def load(self) -> tuple[list[SavedDrive], list[Text]]:
-        """The drives, and a message for each invalid entry; both empty where there is no file."""
+        """The drives, and a message for each invalid entry; both empty where there is no file.
+
+        Damaged lists that were kept under another name have a message each as well.
+        """
+        self._damaged = False
+        kept = [
+            text("station.drive-list-damaged-kept", file=str(file))
+            for file in sorted(self._path.parent.glob(f"{self._path.name}{_DAMAGED}*"))
+        ]
         try:
-            content = json.loads(self._path.read_text("utf-8"))
-            entries = content["drives"]
+            entries = _entries(json.loads(self._path.read_text("utf-8")))
         except FileNotFoundError:
-            return [], []
+            return [], kept
         except (OSError, ValueError, KeyError, TypeError) as error:
+            self._damaged = True
             cause = prose(str(error))
-            return [], [text("station.drive-list-not-read", file=self._path.name, cause=cause)]
+            line = text("station.drive-list-not-read", file=self._path.name, cause=cause)
+            return [], [line, *kept]
         drives: list[SavedDrive] = []
         problems: list[Text] = []
-        for number, entry in enumerate(entries if isinstance(entries, list) else [], start=1):
+        for number, entry in enumerate(entries, start=1):
             try:
                 drives.append(_DRIVE.validate_python(entry))
             except ValidationError as error:
@@ -85,4 +104,34 @@ class DriveList:
                         cause=reason_of(first),
                     )
                 )
-        return drives, problems
+        self._damaged = bool(problems)
+        return drives, problems + kept
+
+    def _set_aside(self) -> None:
+        """Keep the present file under another name before it is replaced."""
+        number, aside = 2, self._path.with_name(self._path.name + _DAMAGED)
+        while aside.exists():
+            aside = self._path.with_name(f"{self._path.name}{_DAMAGED}-{number}")
+            number += 1
+        try:
+            try:
+                # The file stays at its place as well, so that no failure leaves none there.
+                aside.hardlink_to(self._path)
+            except OSError:
+                self._path.rename(aside)
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            raise StorageFailed(
+                "store.not-written",
+                value=str(aside),
+                path=aside.name,
+                strerror=str(error.strerror or error),
+            ) from error
+
+
+def _entries(content: dict[str, object]) -> list[object]:
+    entries = content["drives"]
+    if not isinstance(entries, list):
+        raise TypeError("drives: not a list")
+    return entries

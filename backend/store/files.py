@@ -78,6 +78,22 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
         raise _failed(path, error) from error
 
 
+def require_writable(path: Path) -> None:
+    """Check that `write_atomically` can write this file, by a temporary file beside it.
+
+    Raises:
+        StorageFailed: as `write_atomically`; nothing is left behind.
+    """
+    try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}.") as file:
+            file.write(b" ")
+    except OSError as error:
+        raise _failed(path, error) from error
+
+
 def _failed(path: Path, error: OSError) -> StorageFailed:
     return StorageFailed(
         "store.not-written",

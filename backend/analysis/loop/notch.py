@@ -18,6 +18,7 @@ TURN = 2.0 * np.pi
 #: Stored value of a coefficient c is round(c * COEFFICIENT_SCALE) + COEFFICIENT_OFFSET (UINT16).
 COEFFICIENT_SCALE = 10_000
 COEFFICIENT_OFFSET = 32_768
+_MOST_STEPS = float(1 << 53)
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,11 @@ def _stored(coefficient: float) -> int:
     return value
 
 
+def highest_hz(sample_time_s: float) -> float:
+    """Half the rate of the loop: no centre or width above it can be encoded."""
+    return 0.5 / sample_time_s
+
+
 def encode_coefficients(notch: Notch, sample_time_s: float) -> NotchCoefficients:
     """Encode MMS7 2008h: a1 = w² + d·g - 2, a2 = 1 - d·g, b1 = w² + g - 2, b2 = 1 - g, w and g
     times ts.
@@ -86,6 +92,12 @@ def encode_coefficients(notch: Notch, sample_time_s: float) -> NotchCoefficients
     Raises:
         ValueError: a coefficient exceeds 16 bits, or the rounded filter is not stable.
     """
+    highest = highest_hz(sample_time_s)
+    if not max(notch.center_hz, notch.width_hz) <= highest:
+        raise ValueError(
+            f"notch at {notch.center_hz:g} Hz, {notch.width_hz:g} Hz wide: "
+            f"outside 0 to {highest:g} Hz"
+        )
     w, g = TURN * notch.center_hz * sample_time_s, TURN * notch.width_hz * sample_time_s
     d = 10.0 ** (notch.depth_db / 20.0)
     raw = NotchCoefficients(
@@ -177,7 +189,9 @@ class IntegerRange:
 
     def step(self, value: float) -> int:
         """Return the nearest step, allowed or not."""
-        return int(np.floor((value - self.offset) / self.scale + 0.5))
+        step = np.floor((value - self.offset) / self.scale + 0.5)
+        # Infinity is no integer, and no parameter has as many steps.
+        return int(np.clip(step, -_MOST_STEPS, _MOST_STEPS))
 
     def nearest(self, value: float) -> int:
         """Return the nearest allowed step."""

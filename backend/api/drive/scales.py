@@ -19,6 +19,7 @@ from backend.api.models import JobInfo
 from backend.audit.asked import note_before
 from backend.axis import teaching
 from backend.axis.restoring import shielded
+from backend.drive.identity import read_serial
 from backend.scales.scale import Origin, Quantity, Scale, what_to_do
 from backend.scales.taught import Taught
 from backend.scales.units import AxisUnits
@@ -121,6 +122,11 @@ async def _keep(bench: Bench, connected: ConnectedDrive, taught: Taught | None) 
     drive, store = connected.drive, bench.axis_records
     old = store.get(drive.id)
     note_before(scales=None if old.scales is None else old.scales.model_dump())
+    if taught is not None:
+        of = bench.taught_drive(drive)
+        if of.serial is None:
+            of = bench.taught_drive(drive, await read_serial(drive))
+        taught = taught.model_copy(update={"of": of})
     with bench.motion.keeping_still(connected):
         store.put(drive.id, old.model_copy(update={"scales": taught}))
         connected.axis.teach(taught)

@@ -210,18 +210,20 @@ async def delete_library_entry(
     bench: TheBench, recordings: TheRecordings, entry_id: int
 ) -> Response:
     """Archive a parameter set or a shared entry; delete a file of this station permanently."""
+    entry = await bench.records.store.call(_entry, bench, entry_id)
+    if entry.kind == "recording" and entry.station == bench.records.station:
+        # Here, as it is refused while it is being recorded or exported.
+        await recordings.delete(entry.name)
 
     def work() -> None:
         records = bench.records
-        entry = _entry(bench, entry_id)
         if entry.station not in ("", records.station):
             raise NotAllowed("api-library.lies-station", value=entry.name, station=entry.station)
         if entry.station == "":
             records.library.delete(entry_id)
             return
-        if entry.kind == "recording":
-            recordings.library.delete(entry.name)
-        elif (path := records.index.path(entry.kind, entry.name)) is not None:
+        path = records.index.path(entry.kind, entry.name)
+        if entry.kind != "recording" and path is not None:
             path.unlink(missing_ok=True)
         records.library.reported_deleted(entry)
         records.index.refresh(recordings.running)

@@ -9,7 +9,15 @@ from fastapi import APIRouter, Query, Response
 
 import backend
 from backend.api import convert
-from backend.api.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
+from backend.api.context import (
+    Connection,
+    Controlled,
+    Me,
+    TheBench,
+    TheDrive,
+    ThePeople,
+    member_of,
+)
 from backend.api.drive.convert_stop import stop_result
 from backend.api.drive.models_axis import StopRequest, StopResult
 from backend.api.errors import NotFound, message_of, words_of
@@ -219,10 +227,13 @@ async def add_port(
 
 
 @router.delete("/drives/{drive_id}", status_code=204)
-async def remove_drive(bench: TheBench, connected: Controlled) -> Response:
+async def remove_drive(bench: TheBench, drive_id: str) -> Response:
     """Remove a drive from the bench."""
-    await bench.remove(connected.drive.id)
-    bench.audit.add(Fact("station", "taken off the bench", connected.drive.name))
+    if bench.missing(drive_id) is None:
+        await member_of(drive_id, bench)
+    name = bench.name_of(drive_id)
+    await bench.remove(drive_id)
+    bench.audit.add(Fact("station", "taken off the bench", name))
     return Response(status_code=204)
 
 

@@ -49,9 +49,12 @@ from backend.tools.notch.meaning import meaning_of
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep.stored import reevaluated
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import joined, reason_of, text
 
 router = APIRouter()
+#: [Hz, dB] Above the range of every notch, and far below floating-point overflow.
+_MOST = 1e12
 
 
 def _shape(found: Notch | None) -> NotchShape | None:
@@ -74,7 +77,25 @@ def _realised(found: RealisedNotch | None) -> RealisedInfo | None:
     )
 
 
+def _require_finite(figures: Sequence[float]) -> None:
+    """Check figures of notches, so that no response of them overflows.
+
+    Raises:
+        OutOfRange: one is beyond every range.
+    """
+    for value in figures:
+        if not abs(value) <= _MOST:
+            raise OutOfRange(
+                "api-tuning.beyond-every-range",
+                value=f"{value:g}",
+                limit=limits.between(-_MOST, _MOST),
+            )
+
+
 def _notches(wanted: Sequence[NotchShape | None]) -> list[Notch | None]:
+    for w in wanted:
+        if w is not None:
+            _require_finite((w.center_hz, w.width_hz, w.depth_db))
     return [None if w is None else Notch(w.center_hz, w.width_hz, w.depth_db) for w in wanted]
 
 
@@ -106,6 +127,7 @@ async def read_notches(connected: TheDrive) -> list[NotchSlotInfo]:
 async def preview_notches(connected: TheDrive, request: NotchPreviewRequest) -> NotchPreviewInfo:
     """Preview how the drive would realise these notches. Nothing is read or written."""
     profile, name = connected.drive.profile, connected.drive.name
+    _require_finite(request.frequency_hz)
     wanted, meaning = _notches(request.notches), meaning_of(connected.drive)
     slots = [notch.encode(profile, name, n, w, None, meaning) for n, w in enumerate(wanted)]
     f = np.asarray(request.frequency_hz, dtype=np.float64)

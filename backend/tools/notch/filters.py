@@ -21,6 +21,7 @@ from backend.analysis.loop.notch import (
     decode_hz_width_db,
     encode_coefficients,
     encode_hz_width_db,
+    highest_hz,
     realised,
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
@@ -31,6 +32,7 @@ from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.steps import attenuation_steps, hz_steps, level_steps
 from backend.tools.thresholds import notch_filters as threshold
 from drivers.errors import NotAllowed, OutOfRange
+from drivers.texts import limits
 from drivers.texts.message import Text, Unsuitable, reason_of, text
 from profiles.schema import NotchSlot, NotchSpec, Parameter, Profile
 
@@ -140,6 +142,7 @@ def encode(
     made: RealisedNotch | None = None
     note: Text | None = None
     if notch is not None:
+        _require_below_highest(spec, drive, number, notch)
         try:
             raw, made, note = _encoded(profile, spec, slot, notch, meaning)
         except ValueError as error:
@@ -153,6 +156,27 @@ def encode(
     raw |= _enable(profile, slot, notch is not None, enable_now)
     _require_meant(profile, drive, number, notch, raw, meaning)
     return Preview(number, notch, raw, made, note)
+
+
+def _require_below_highest(spec: NotchSpec, drive: str, number: int, notch: Notch) -> None:
+    """Check that coefficients can be computed at all.
+
+    Raises:
+        OutOfRange: centre or width is above half the rate of the loop.
+    """
+    if spec.encoding != "coefficients" or spec.sample_time_s is None:
+        return
+    highest = highest_hz(spec.sample_time_s)
+    value = max(notch.center_hz, notch.width_hz)
+    if not value <= highest:
+        raise OutOfRange(
+            "notch.above-highest",
+            drive=drive,
+            value=f"{value:g} Hz",
+            limit=limits.between(0.0, highest, "Hz"),
+            number=number + 1,
+            highest_hz=highest,
+        )
 
 
 def _require_meant(

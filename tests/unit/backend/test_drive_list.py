@@ -8,12 +8,16 @@ from pathlib import Path
 
 import pytest
 
+from backend.api.errors import NotFound
+from backend.api.station.routes import remove_drive
 from backend.axis.remembered import AxisRecord
+from backend.scales.scale import ScaleUnknown
 from backend.scales.taught import Taught
 from backend.station.bench import Bench
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
 from backend.store.files import StorageFailed
 from drivers.errors import LinkLost
+from drivers.link import Found
 from tests.support.memory_link import MemoryLink
 
 X = SavedDrive("X", "mms7", (SavedPort("mlink:///dev/ttyUSB0", 1),), "left", 77)
@@ -52,6 +56,53 @@ def test_a_damaged_file_is_reported_and_not_fatal(tmp_path: Path) -> None:
         assert (loaded, len(problems)) == ([], 1)
         assert "bench.json cannot be read" in problems[0].words()
         assert "无法读取" in problems[0].words("zh")
+
+
+@pytest.mark.parametrize("damage", ["whole", "entry", "no list"])
+def test_a_damaged_list_is_kept_under_another_name(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / "bench.json"
+    drives = DriveList(path)
+    for number in (1, 2):
+        drives.store([X, Z])
+        content = json.loads(path.read_text("utf-8"))
+        content["drives"][number - 1]["profile"] = number
+        as_list = json.dumps(content)
+        damaged = {"whole": as_list[:-9], "entry": as_list, "no list": '{"drives": 0}'}[damage]
+        path.write_text(damaged, "utf-8")
+        # Starts alone change nothing.
+        for _ in range(2):
+            drives = DriveList(path)
+            loaded, problems = drives.load()
+            assert len(problems) == number, "the damage, and every earlier list that is kept"
+        drives.store(loaded)
+        drives.store([X])
+        aside = tmp_path / ("bench.json.damaged" + ("" if number == 1 else "-2"))
+        assert aside.read_text("utf-8") == damaged
+    again, problems = DriveList(path).load()
+    assert again == [X]
+    assert [str(tmp_path / "bench.json.damaged") in each.words() for each in problems] == [True] * 2
+    assert "已保留" in problems[0].words("zh")
+
+
+def test_a_damaged_list_that_cannot_be_kept_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "bench.json"
+    path.write_text("[", "utf-8")
+    drives = DriveList(path)
+    drives.load()
+
+    def refused(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "hardlink_to", refused)
+        patch.setattr(Path, "rename", refused)
+        with pytest.raises(StorageFailed):
+            drives.store([X])
+    assert path.read_text("utf-8") == "["
+    drives.store([X])
+    assert drives.load()[0] == [X]
 
 
 async def test_a_full_disk_keeps_nobody_from_connecting_a_drive(tmp_path: Path) -> None:
@@ -136,6 +187,46 @@ async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Pa
     assert sorted(each.name for each in drives.load()[0]) == ["Y", "Z"]
 
 
+async def test_a_drive_that_is_gone_for_good_can_be_removed(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    saved = [
+        SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), id="x"),
+        SavedDrive("Y", "mms7", (SavedPort("mlink://virtual1", 1),), id="y"),
+    ]
+    drives.store(saved)
+    bench = _bench(tmp_path, "mlink://virtual0")
+    bench.axis_records.put("x", AxisRecord(scales=Taught(counts_per_rev=1000.0)))
+    await bench.restore()
+    try:
+        lines = [e.text for e in bench.journal.entries() if e.level == "warning"]
+        assert any("servodeck station forget x" in line for line in lines)
+        answer = await remove_drive(bench, "x")
+        assert answer.status_code == 204
+        assert [each.id for each in drives.load()[0]] == ["y"]
+        assert bench.axis_records.get("x").scales is None
+        with pytest.raises(NotFound):
+            await remove_drive(bench, "x")
+        await remove_drive(bench, "y")
+        assert drives.load() == ([], [])
+    finally:
+        await bench.close()
+
+
+async def test_a_missing_drive_stays_where_the_list_cannot_be_stored(tmp_path: Path) -> None:
+    path = tmp_path / "bench.json"
+    DriveList(path).store([SavedDrive("X", "mms7", (SavedPort("mlink://virtual0", 1),), id="x")])
+    bench = _bench(tmp_path, "mlink://virtual0")
+    await bench.restore()
+    path.unlink()
+    path.mkdir()
+    try:
+        with pytest.raises(StorageFailed):
+            await remove_drive(bench, "x")
+        assert bench.missing("x") is not None
+    finally:
+        await bench.close()
+
+
 async def test_a_bench_may_have_many_drives(tmp_path: Path) -> None:
     drives = DriveList(tmp_path / "bench.json")
     drives.store(
@@ -159,7 +250,8 @@ async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Pa
     await bench.restore()
     second = bench.connected("drive-2").drive
     assert second.name == "轴二"
-    taught = Taught(counts_per_rev=1000.0)
+    of = bench.taught_drive(bench.connected("drive").drive)
+    taught = Taught(counts_per_rev=1000.0, of=of)
     bench.axis_records.put("drive", AxisRecord(scales=taught))
     bench.rename("drive-2", None, "stored")
     await bench.close()
@@ -172,6 +264,7 @@ async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Pa
     first = await bench.connect("mlink://virtual6", 1, "mms7", "轴一")
     assert first.drive.id == "drive"
     assert bench.axis_records.get(first.drive.id).scales == taught
+    assert first.axis.taught is None, "without a serial number it may be another drive"
     await bench.close()
     assert len(drives.load()[0]) == 3
     # Another order in the list changes nothing.
@@ -183,3 +276,118 @@ async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Pa
         "轴一": "drive", "轴二": "drive-2", "轴三": "drive-3",
     }  # fmt: skip
     await bench.close()
+
+
+# --- scales that a person stated, and the drive that they belong to -------------------------
+
+P0, P1 = "canopen://virtual0", "canopen://virtual1"
+STATED = Taught(counts_per_rev=10_000, raw_per_rpm=10.0, raw_per_rpm_s=10.0)
+
+
+def _silent() -> MemoryLink:
+    """A drive that states nothing of its scales."""
+    link = MemoryLink({})
+    link.kind = "canopen"
+    return link
+
+
+def _scales_bench(folder: Path) -> Bench:
+    return Bench(folder, {P0: _silent, P1: _silent})
+
+
+def _state(bench: Bench, drive_id: str) -> None:
+    connected = bench.connected(drive_id)
+    taught = STATED.model_copy(update={"of": bench.taught_drive(connected.drive)})
+    bench.axis_records.put(drive_id, AxisRecord(scales=taught))
+    connected.axis.teach(taught)
+
+
+async def _add(bench: Bench, url: str, serial: int | None, profile: str = "generic402") -> bool:
+    """Whether the scales of the drive "X" are certain."""
+    found = None if serial is None else Found(1, serial=serial)
+    connected = await bench.connect(url, 1, profile, "X", found=found)
+    assert connected.drive.id == "x"
+    return (await connected.axis.units()).scales.position.certain
+
+
+@pytest.mark.parametrize(
+    ("stated_for", "url", "serial", "counts"),
+    [
+        (7, P0, 7, True),
+        (7, P1, 7, True),  # the serial number tells
+        (7, P0, 8, False),
+        (7, P0, None, True),  # not known here: by place
+        (7, P1, None, False),
+        (None, P0, None, False),  # removed with the drive, as nothing tells the next one
+        (None, P0, 8, False),
+    ],
+)
+async def test_scales_are_those_of_the_same_drive_only(
+    tmp_path: Path, stated_for: int | None, url: str, serial: int | None, counts: bool
+) -> None:
+    bench = _scales_bench(tmp_path)
+    try:
+        await _add(bench, P0, stated_for)
+        _state(bench, "x")
+        assert (await bench.connected("x").axis.units()).scales.position.certain
+        await bench.remove("x")
+        assert await _add(bench, url, serial) == counts
+    finally:
+        await bench.close()
+
+
+async def test_another_drive_under_a_known_name_says_why_its_scale_is_unknown(
+    tmp_path: Path,
+) -> None:
+    bench = _scales_bench(tmp_path)
+    try:
+        await _add(bench, P0, 7)
+        _state(bench, "x")
+        await bench.remove("x")
+        assert not await _add(bench, P0, 8)
+        with pytest.raises(ScaleUnknown, match=r"stated for another drive.*serial number 7") as no:
+            await bench.connected("x").axis.require_certain_scales()
+        assert "另一台驱动器" in no.value.text.words("zh")
+        lines = [e.text for e in bench.journal.entries() if e.level == "warning"]
+        assert any("serial number 7" in line and "not used" in line for line in lines)
+        # The next start says the same of the drive in the list.
+        await bench.close()
+        bench = _scales_bench(tmp_path)
+        await bench.restore()
+        assert bench.connected("x").axis.taught is None
+    finally:
+        await bench.close()
+
+
+async def test_a_drive_of_the_list_keeps_its_scales_over_a_start(tmp_path: Path) -> None:
+    for serial in (7, None):
+        bench = _scales_bench(tmp_path)
+        await _add(bench, P0, serial)
+        _state(bench, "x")
+        await bench.close()
+        bench = _scales_bench(tmp_path)
+        await bench.restore()
+        assert bench.connected("x").axis.taught is not None
+        await bench.remove("x")
+        await bench.close()
+
+
+async def test_scales_of_earlier_versions_stay_with_the_drive_of_the_list(tmp_path: Path) -> None:
+    drives = DriveList(tmp_path / "bench.json")
+    drives.store([SavedDrive("X", "generic402", (SavedPort(P0, 1),), serial=7, id="x")])
+    bench = _scales_bench(tmp_path)
+    bench.axis_records.put("x", AxisRecord(scales=STATED))
+    bench.axis_records.put("y", AxisRecord(scales=STATED))
+    await bench.restore()
+    try:
+        taught = bench.connected("x").axis.taught
+        assert taught is not None
+        assert taught.of is not None
+        assert taught.of.serial == 7
+        # Nobody knows for which drive the others were stated.
+        other = await bench.connect(P1, 1, "generic402", "Y")
+        assert other.drive.id == "y"
+        assert other.axis.taught is None
+        assert bench.axis_records.get("y").scales is None
+    finally:
+        await bench.close()

@@ -13,11 +13,18 @@ import pytest
 from backend.analysis.loop.notch import LevelCalibration, Notch
 from backend.analysis.loop.notch_effect import fit_effect, seen_ratio
 from backend.analysis.response.sampling import SignalPath
+from backend.api.tuning.design import preview_notches
+from backend.api.tuning.models import NotchPreviewRequest
+from backend.axis.axis import Axis
+from backend.drive.drive import Drive
+from backend.drive.ports import Port
+from backend.station.connected_drive import ConnectedDrive
 from backend.tools.notch.filters import encode, off_raw, response
 from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import OutOfRange
 from profiles.loader import load_profile
 from profiles.schema import Parameter, Profile
+from tests.support.memory_link import MemoryLink
 
 MMS7, M6L, R6L, DSC = (load_profile(name) for name in ("mms7", "m6l", "r6l", "ds_c"))
 COEFFICIENTS = ("2008:02", "2008:03", "2008:04", "2008:05")
@@ -205,3 +212,53 @@ def test_nothing_like_a_notch_is_said() -> None:
         fit_effect(f, np.ones(200, np.complex128), SignalPath(1000.0))
     shallow = seen_ratio(Notch(100.0, 50.0, 0.0), f, SignalPath(1000.0))
     assert np.allclose(shallow, 1.0)
+
+
+@pytest.mark.parametrize("hz", [1e5, 1e200, 1e308, float("inf")])
+def test_figures_beyond_every_range_are_refused_with_the_limit(hz: float) -> None:
+    for notch in (Notch(hz, 100.0, -20.0), Notch(1000.0, hz, -20.0)):
+        with pytest.raises(OutOfRange) as refused:
+            encode(MMS7, "X", 0, notch, 0)
+        assert "10000 Hz" in str(refused.value)
+        assert "10000 Hz" in str(refused.value.limit)
+        assert "陷波器" in refused.value.text.words("zh")
+        with pytest.raises(ValueError, match="10000 Hz"):
+            response(MMS7, notch, np.array([100.0]))
+    levels = LevelCalibration(((3, 0.15), (20, 1.0)), ((10, -20.0), (30, -10.5)))
+    tenths = _dsc(PA_50={"scale": 0.1}, PA_51={"scale": 0.1}, PA_52={"scale": 0.1})
+    for profile in (DSC, tenths, M6L, R6L):
+        meaning = NotchMeaning(500.0, levels) if profile is R6L else None
+        with pytest.raises(OutOfRange, match="is outside"):
+            encode(profile, "X", 0, Notch(hz, 100.0, -20.0), 0, meaning)
+    # Width and depth are moved to the nearest that the drive has.
+    made = encode(tenths, "X", 0, Notch(433.0, hz, -1e308), 0)
+    assert made.raw["PA_51"] == tenths.by_key["PA_51"].raw_limits[1]
+    assert made.raw["PA_52"] == tenths.by_key["PA_52"].raw_limits[1]
+
+
+@pytest.mark.parametrize("profile", [MMS7, M6L, DSC], ids=lambda each: each.drive)
+@pytest.mark.parametrize(
+    ("notch", "hz"),
+    [
+        ((1e308, 80.0, -20.0), 100.0),
+        ((433.0, 1e308, -20.0), 100.0),
+        ((433.0, 80.0, -float("inf")), 100.0),
+        ((433.0, 80.0, -20.0), 1e308),
+        ((433.0, 80.0, -20.0), float("nan")),
+    ],
+)
+async def test_the_preview_refuses_what_no_number_can_hold(
+    profile: Profile, notch: tuple[float, float, float], hz: float
+) -> None:
+    drive = Drive("x", "X", profile, [Port(MemoryLink({}), 1, profile.links[0])])
+    connected = ConnectedDrive(drive, Axis(drive), None)  # type: ignore[arg-type]
+    shape = dict(zip(("center_hz", "width_hz", "depth_db"), notch, strict=True))
+    request = NotchPreviewRequest.model_validate({"notches": [shape], "frequency_hz": [hz]})
+    with pytest.raises(OutOfRange) as refused:
+        await preview_notches(connected, request)
+    assert refused.value.limit is not None
+    fine = NotchPreviewRequest.model_validate(
+        {"notches": [{"center_hz": 433, "width_hz": 80, "depth_db": -20}], "frequency_hz": [400]}
+    )
+    shown = await preview_notches(connected, fine)
+    assert np.isfinite(shown.magnitude_db).all()

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-import pytest
+from types import SimpleNamespace
 
+import pytest
+from typer.testing import CliRunner
+
+from backend import cli
+from backend.commands import session
 from backend.commands.doctor import _fitting
 from backend.commands.scales import _farther
 from backend.station.matching import match_profiles
 from drivers.link import Found
+from tests.support.memory_link import MemoryLink
 
 _UNKNOWN = 0x0BAD
 
@@ -34,3 +40,35 @@ def test_the_doctor_takes_an_unknown_drive_up_by_the_standards_objects() -> None
 def test_the_next_small_move_is_one_that_may_be_made(moved: int, most: int, next_move: int) -> None:
     """A drive that arrives one increment short may move ten times as far as it has come."""
     assert _farther(moved, most) == next_move
+
+
+class _Bus(MemoryLink):
+    """A CAN bus with these stations, none of which is a drive."""
+
+    def __init__(self, *stations: int) -> None:
+        super().__init__({})
+        self.kind = "canopen"
+        self.doctor = SimpleNamespace()  # type: ignore[assignment]
+        self._stations = stations
+
+    async def scan(self, *_: object, **__: object) -> list[Found]:
+        return [Found(n, vendor_id=_UNKNOWN, device_profile=401) for n in self._stations]
+
+
+@pytest.mark.parametrize(
+    ("stations", "code", "said"),
+    [((), 1, "no station answers: check"), ((5,), 0, "no servo drive")],
+)
+def test_the_doctor_says_that_no_station_answers(
+    monkeypatch: pytest.MonkeyPatch, stations: tuple[int, ...], code: int, said: str
+) -> None:
+    monkeypatch.setattr(session, "link_for", lambda _url: _Bus(*stations))
+    done = CliRunner().invoke(cli.app, ["doctor", "canopen://socketcan/can9"])
+    assert done.exit_code == code
+    assert said in done.output
+
+
+def test_the_doctor_gives_scripts_an_empty_list_then(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session, "link_for", lambda _url: _Bus())
+    done = CliRunner().invoke(cli.app, ["doctor", "canopen://socketcan/can9", "--json"])
+    assert (done.exit_code, done.stdout.strip()) == (1, "[]")

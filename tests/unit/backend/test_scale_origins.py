@@ -10,12 +10,13 @@ import pytest
 from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.axis.remembered import AxisRecord, AxisStore
+from backend.commands.scales import take_taught, taught_file
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.drive.readings import Reading
 from backend.scales.resolve import Reported, scales_of
 from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
-from backend.scales.taught import Taught
+from backend.scales.taught import Taught, TaughtDrive
 from backend.scales.units import AxisUnits, read_units
 from backend.scales.units_found import nearest_unit
 from backend.scales.words import apart, halt_words
@@ -310,3 +311,31 @@ async def test_what_is_said_is_kept_with_the_axis(tmp_path: Path) -> None:
     store = AxisStore(tmp_path)
     store.put("x", AxisRecord(scales=taught))
     assert AxisStore(tmp_path).get("x").scales == taught
+
+
+async def test_a_command_uses_no_scales_of_another_family_at_the_same_place(tmp_path: Path) -> None:
+    """Without a serial number, place and profile tell drives apart."""
+    axis = plain(resolution=1_000)
+    file = await taught_file(axis.drive, tmp_path)
+    file.parent.mkdir(parents=True)
+    places = (("mlink://memory", 1),)
+    for of, counts in (
+        (TaughtDrive(profile="generic402", places=places), True),
+        (TaughtDrive(profile="ds_c", places=places), False),
+        (None, False),  # as earlier versions stored them
+    ):
+        file.write_text(Taught(counts_per_rev=2_000.0, of=of).model_dump_json(), "utf-8")
+        await take_taught(axis, tmp_path)
+        assert (axis.taught is not None) == counts
+    with pytest.raises(ScaleUnknown, match="stated for another drive"):
+        (await axis.units()).acceleration_raw(1.0)
+
+
+async def test_a_command_uses_scales_of_the_same_serial_number(tmp_path: Path) -> None:
+    axis = plain(resolution=1_000)
+    axis.drive.ports[0].link.objects[0x1018, 4] = (7).to_bytes(4, "little")  # type: ignore[attr-defined]
+    file = await taught_file(axis.drive, tmp_path)
+    file.parent.mkdir(parents=True)
+    file.write_text(Taught(counts_per_rev=2_000.0).model_dump_json(), "utf-8")
+    await take_taught(axis, tmp_path)
+    assert axis.taught is not None

@@ -47,6 +47,24 @@ def test_what_is_kept_or_running_stays(library: RecordingLibrary) -> None:
     assert names(library) == {"old", "fresh"}
 
 
+@pytest.mark.parametrize("remarks", ["", '{"kept": tr', "[]", '{"kept": "yes"}', "\x00"])
+def test_what_has_damaged_remarks_counts_as_kept(library: RecordingLibrary, remarks: str) -> None:
+    (library.folder / "old.sdrec.json").write_text(remarks, "utf-8")
+    (library.folder / "newer.sdrec.json").write_text('{"notes": "", "tags": []}', "utf-8")
+    library.set_retention(Retention(max_total_bytes=0, keep_days=0.1))
+    assert library.prune(now=NOW) == ["newer.sdrec", "fresh.sdrec"]
+    # A person sees it, and may decide otherwise.
+    assert library.describe("old.sdrec").remarks.kept
+    library.annotate("old.sdrec", notes=None, tags=None, kept=False)
+    assert library.prune(now=NOW) == ["old.sdrec"]
+
+
+def test_remarks_that_cannot_be_read_count_as_kept(library: RecordingLibrary) -> None:
+    (library.folder / "old.sdrec.json").mkdir()
+    library.set_retention(Retention(max_total_bytes=0, keep_days=0.1))
+    assert "old.sdrec" not in library.prune(now=NOW)
+
+
 def test_without_bounds_everything_stays(library: RecordingLibrary) -> None:
     library.set_retention(Retention(max_total_bytes=None))
     assert library.prune(now=NOW + 1000 * DAY_S) == []

@@ -1,3 +1,4 @@
+api-tuning_beyond-every-range = { $value } is beyond the range of every notch
 api-tuning_cannot-be-evaluated = { $value }: { $cause }
 api-tuning_give-either-gains-level = give either gains or a level
     .remedy = give one of the two

@@ -1,3 +1,4 @@
+api-tuning_beyond-every-range = { $value } 超出任何陷波器的范围
 api-tuning_cannot-be-evaluated = { $value }：{ $cause }
 api-tuning_give-either-gains-level = 增益与等级只能给出其一
     .remedy = 请给出其中之一

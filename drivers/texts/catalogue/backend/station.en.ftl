@@ -21,6 +21,7 @@ station_cyclic-exchange-just-being = { $url }: the cyclic exchange is just being
 station_cyclic-exchange-runs-already = { $url }: the cyclic exchange runs already
     .remedy = end it first
 station_doctor-knows-not = { $value }: the doctor supports EtherCAT and CANopen only
+station_drive-list-damaged-kept = a damaged list of drives is kept: { $file }. Connect the drives that are missing, then delete the file
 station_drive-list-entry-unusable = { $file }, drive { $number }: { $place }: { $cause }
 station_drive-list-not-read = { $file } cannot be read: { $cause }
 station_drive-station-cannot-list = the drive at station { $station } cannot list its own objects: CANopen has no such service, and it carries no EDS (1021h: { $cause })

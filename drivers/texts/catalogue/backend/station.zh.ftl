@@ -21,6 +21,7 @@ station_cyclic-exchange-just-being = { $url }：正在更改周期通信
 station_cyclic-exchange-runs-already = { $url }：周期通信已在运行
     .remedy = 请先结束它
 station_doctor-knows-not = { $value }：诊断功能只支持 EtherCAT 和 CANopen
+station_drive-list-damaged-kept = 已保留损坏的驱动器列表：{ $file }。请连接缺少的驱动器，然后删除该文件
 station_drive-list-entry-unusable = { $file }，第 { $number } 个驱动器：{ $place }：{ $cause }
 station_drive-list-not-read = 无法读取 { $file }：{ $cause }
 station_drive-station-cannot-list = 站 { $station } 的驱动器不能列出自身的对象：CANopen 没有此服务，且它未存储 EDS（1021h：{ $cause }）

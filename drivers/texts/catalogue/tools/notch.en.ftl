@@ -1,3 +1,5 @@
+notch_above-highest = { $drive }: notch { $number }: centre and width must be at most half the rate of the loop, { NUM($highest_hz, format: "g") } Hz, not { $value }
+    .remedy = choose a lower centre and width
 notch_as-measured = as measured on this drive
 notch_documents-no-notch-filters = { $drive }: { $profile_title } documents no notch filters
     .remedy = lower the loop gain, or stiffen the mechanics

@@ -1,3 +1,5 @@
+notch_above-highest = { $drive }：陷波器 { $number }：中心频率和宽度不得超过环路频率的一半，即 { NUM($highest_hz, format: "g") } Hz，不能为 { $value }
+    .remedy = 请选择较低的中心频率和宽度
 notch_as-measured = 按本驱动器的实测结果
 notch_documents-no-notch-filters = { $drive }：{ $profile_title } 的手册未说明陷波器
     .remedy = 请降低环路增益，或提高机械刚度
