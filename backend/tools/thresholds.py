@@ -1341,6 +1341,8 @@ class dwell_run:
     """[s] Origin: docs/vibration.md."""
     FADE_S = 0.5
     """[s] Origin: docs/vibration.md."""
+    LONGEST_S = 60
+    """[s] Longest time at full amplitude, as of its setting. Origin: docs/vibration.md."""
     # RAMP_S, STROKE_S: Ramps of the slow speed, and how long a stroke of it lasts at most.
     RAMP_S = 0.3
     """[s] Origin: docs/vibration.md."""

@@ -69,18 +69,10 @@ def followed(
     ``first`` is the sample number of ``signal[0]``. Least squares with a polynomial trend in each
     block, so that slow motion and lost samples have no influence.
     """
-    period = rate_hz / frequency_hz
-    periods = max(threshold.PERIODS, int(np.ceil(threshold.BLOCK_S * frequency_hz)))
-    size = max(round(periods * period), 4 * harmonics + 8)
-    count = min(signal.size // size, threshold.BLOCKS)
-    size = signal.size // max(count, 1)
     rows: list[ComplexArray] = []
     middle_s: list[float] = []
-    for number in range(count):
-        part = slice(number * size, (number + 1) * size)
-        good = valid[part]
-        if np.mean(good) < threshold.ARRIVED:
-            continue
+    for part in used_blocks(valid, frequency_hz, rate_hz, harmonics):
+        good, size = valid[part], part.stop - part.start
         at = first + np.arange(part.start, part.stop)
         phase = 2 * np.pi * frequency_hz / rate_hz * at
         turning = np.outer(phase, np.arange(1, harmonics + 1))
@@ -91,3 +83,16 @@ def followed(
         rows.append(solved[:harmonics] + 1j * solved[harmonics : 2 * harmonics])
     blocks = np.array(rows, np.complex128).reshape(len(rows), harmonics)
     return Followed(blocks, np.array(middle_s))
+
+
+def used_blocks(
+    valid: BoolArray, frequency_hz: float, rate_hz: float, harmonics: int
+) -> list[slice]:
+    """Return the blocks of samples [n] that `followed` evaluates; ``valid``: which are given."""
+    period = rate_hz / frequency_hz
+    periods = max(threshold.PERIODS, int(np.ceil(threshold.BLOCK_S * frequency_hz)))
+    size = max(round(periods * period), 4 * harmonics + 8)
+    count = min(valid.size // size, threshold.BLOCKS)
+    size = valid.size // max(count, 1)
+    parts = [slice(number * size, (number + 1) * size) for number in range(count)]
+    return [part for part in parts if np.mean(valid[part]) >= threshold.ARRIVED]

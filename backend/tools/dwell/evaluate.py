@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.vibration.dwell import Followed, followed
+from backend.analysis.vibration.dwell import Followed, followed, used_blocks
 from backend.tools.dwell.result import DwellEstimate, DwellFinding, DwellHarmonic, DwellResult
 from backend.tools.dwell.settings import DwellSettings
 from backend.tools.measuring.recording import Recording
@@ -88,7 +88,7 @@ def evaluate(dwelt: Dwelt, settings: DwellSettings) -> DwellResult:
     first, last = int(within[0]), int(within[-1]) + 1
     part = slice(first, last)
     good = dwelt.recording.valid[part] & dwelt.counts[part]
-    count = max(1, min(threshold.HARMONICS, int(threshold.BAND * rate / frequency)))
+    count = harmonics_of(frequency, rate)
     angle = dwelt.recording.position_rad[part]
     torque = dwelt.recording.torque_nm[part] / dwelt.rated_torque_nm * 100.0
     sine, turned, twisted = (
@@ -132,6 +132,21 @@ def evaluate(dwelt: Dwelt, settings: DwellSettings) -> DwellResult:
         trace_rpm=tuple(float(v) for v in np.abs(speed.blocks[:, 0])),
         findings=tuple(_findings(speed, seen, step_rpm, settings, rate, good)),
     )
+
+
+def harmonics_of(frequency_hz: float, rate_hz: float) -> int:
+    """Number of multiples of the frequency that are looked for, the first one included."""
+    return max(1, min(threshold.HARMONICS, int(threshold.BAND * rate_hz / frequency_hz)))
+
+
+def long_enough(counts: npt.NDArray[np.bool_], frequency_hz: float, rate_hz: float) -> bool:
+    """Whether the samples [n] that are to count suffice for an evaluation when all arrive."""
+    within = np.flatnonzero(counts)
+    if not within.size:
+        return False
+    part = counts[within[0] : within[-1] + 1]
+    harmonics = harmonics_of(frequency_hz, rate_hz)
+    return len(used_blocks(part, frequency_hz, rate_hz, harmonics)) >= threshold.FEWEST
 
 
 def _estimate(found: Followed, factor: float, step: float) -> DwellEstimate:

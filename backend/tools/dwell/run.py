@@ -11,7 +11,7 @@ from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
 from backend.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.dwell.evaluate import Dwelt, evaluate, reevaluate
+from backend.tools.dwell.evaluate import Dwelt, evaluate, long_enough, reevaluate
 from backend.tools.dwell.result import DwellResult
 from backend.tools.dwell.settings import DwellSettings
 from backend.tools.dwell.texts import TEXTS, report
@@ -131,6 +131,33 @@ def require_inside(settings: DwellSettings, rate: float, units: AxisUnits) -> No
         )
 
 
+def require_long_enough(settings: DwellSettings, rate: float) -> Sequence:
+    """The signals to play, whose time at full amplitude suffices for an evaluation.
+
+    Raises:
+        OutOfRange: states the time that is needed; nothing has moved.
+    """
+
+    def suffices(wanted: Sequence) -> bool:
+        return long_enough(wanted.counts, settings.frequency_hz, rate)
+
+    wanted = sequence(settings, rate)
+    if suffices(wanted):
+        return wanted
+    longer = range(int(settings.duration_s) + 1, threshold.LONGEST_S + 1)
+    changed = (settings.model_copy(update={"duration_s": float(s)}) for s in longer)
+    least_s = next((each.duration_s for each in changed if suffices(sequence(each, rate))), None)
+    if least_s is None:
+        raise NotAllowed("dwell.strokes-too-short", frequency_hz=settings.frequency_hz)
+    raise OutOfRange(
+        "dwell.too-short",
+        value=settings.duration_s,
+        limit=f"{least_s:g} s",
+        frequency_hz=settings.frequency_hz,
+        least_s=least_s,
+    )
+
+
 @dataclass
 class Live:
     """Present amplitude of the speed, from the newest raw samples."""
@@ -158,7 +185,8 @@ async def run(run: Run, settings: DwellSettings) -> DwellResult:
     """Vibrate; the axis ends where it began, with its settings restored.
 
     Raises:
-        OutOfRange: the vibration does not fit into the envelope; nothing has moved.
+        OutOfRange: the vibration does not fit into the envelope, or is too short to be evaluated;
+            nothing has moved.
         NotAllowed: the drive accepts no torque offset (60B2h) in every cycle, or the envelope or a
             fault ended the motion.
     """
@@ -168,9 +196,9 @@ async def run(run: Run, settings: DwellSettings) -> DwellResult:
     units = await axis.require_certain_scales()
     rate = 1.0 / cycle_s(session)
     require_inside(settings, rate, units)
+    wanted = require_long_enough(settings, rate)
     facts = await read_facts(axis, settings.rated_torque_nm)
     home = await axis.position_raw()
-    wanted = sequence(settings, rate)
     live = Live(settings.frequency_hz, rate, units.velocity(1.0))
     recording = await speed_move(
         axis, session, wanted.base_rpm + (wanted.sine if by_speed else 0.0), envelope, facts,
