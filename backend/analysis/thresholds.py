@@ -832,6 +832,12 @@ class foreign:
     """[count] Origin: 855a6a86."""
     LEAST_SAMPLES = 256
     """[count] Origin: 855a6a86."""
+    # LEAST_SPAN, MOST_SPAN: From the lowest to the highest sample, in the signal's unit: fourth
+    # powers of it, and over the other signal's, are floats.
+    LEAST_SPAN = 1e-70
+    """[count] Origin: tests/unit/analysis/test_foreign_response.py."""
+    MOST_SPAN = 1e70
+    """[count] Origin: tests/unit/analysis/test_foreign_response.py."""
     LINES = 400
     """[count] Lines of a record without periods; more say nothing more. Origin: 855a6a86."""
     EXCITED_DB = -30.0

@@ -178,7 +178,18 @@ def _reported(error: NoResponse, name: str, signals: Signals) -> BadRecording:
             name=name,
             facts=facts["samples"],
         )
-    column = signals.input_name if error.code == "input-constant" else signals.output_name
+    of_input = error.code in ("input-constant", "input-span")
+    column = signals.input_name if of_input else signals.output_name
+    if error.code in ("input-span", "output-span"):
+        return BadRecording(
+            "import.column-span",
+            parameter=column,
+            value=facts["value"],
+            limit=f"{facts['least']:g} … {facts['most']:g}",
+            name=name,
+            least=facts["least"],
+            most=facts["most"],
+        )
     return BadRecording("import.column-constant", parameter=column, value=facts["value"], name=name)
 
 

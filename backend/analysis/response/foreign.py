@@ -154,14 +154,19 @@ def evaluate(
     """Return the response from input to output, both [n], evenly sampled.
 
     Raises:
-        NoResponse: too short, constant, or not coherent.
+        NoResponse: too short, constant, too small or large for floats, or not coherent.
     """
     n = signal_in.size
     if n < LEAST_SAMPLES:
         raise NoResponse("too-short", samples=n, least=LEAST_SAMPLES)
-    for code, signal in (("input-constant", signal_in), ("output-constant", signal_out)):
-        if float(np.ptp(signal)) <= 1e-9 * float(np.max(np.abs(signal)) + 1e-300):
-            raise NoResponse(code, value=float(signal[0]))
+    for name, signal in (("input", signal_in), ("output", signal_out)):
+        span = float(np.max(signal)) - float(np.min(signal))
+        if span <= 1e-9 * (float(np.max(np.abs(signal))) + 1e-300):
+            raise NoResponse(f"{name}-constant", value=float(signal[0]))
+        # Beyond, its power or that over the other one's is zero or infinite as a float.
+        if not threshold.LEAST_SPAN <= span <= threshold.MOST_SPAN:
+            least, most = threshold.LEAST_SPAN, threshold.MOST_SPAN
+            raise NoResponse(f"{name}-span", value=span, least=least, most=most)
     found = find_excitation(signal_in)
     if found.kind == "periodic":
         rows = (signal_in[found.stretch], signal_out[found.stretch])

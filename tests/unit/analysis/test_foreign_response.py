@@ -173,6 +173,30 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
 
 
+@pytest.mark.parametrize("periods", [1, 8])
+@pytest.mark.parametrize(
+    ("of_input", "of_output", "code"),
+    [
+        (1e-200, 1e-200, "input-span"),
+        (1e-160, 1.0, "input-span"),
+        (1.0, 1e-200, "output-span"),
+        (1.0, 1e200, "output-span"),
+        (1e308, 1.0, "input-span"),
+    ],
+)
+def test_signals_whose_power_is_no_float_are_refused(
+    periods: int, of_input: float, of_output: float, code: str
+) -> None:
+    u = np.tile(np.random.default_rng(1).normal(size=4000 // periods), periods)
+    y = np.convolve(u, [0.5, 0.5])[: u.size]
+    with pytest.raises(NoResponse, match=code):
+        evaluate(of_input * (u / np.max(np.abs(u))), of_output * y, RATE)
+    small = evaluate(1e-60 * u, 1e-60 * y, RATE)
+    usual = evaluate(u, y, RATE)
+    assert small.frequency_hz.tolist() == usual.frequency_hz.tolist()
+    assert np.allclose(small.response, usual.response, rtol=1e-6)
+
+
 TIMES = np.arange(round(10 * RATE)) / RATE
 DRAWN = np.random.default_rng(4)
 EXCITED = {

@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from backend.response_import.contents import MAX_UNPACKED_BYTES, read_table
 from backend.response_import.errors import BadRecording
+from backend.response_import.evaluation import ImportSettings, evaluate_file
 from backend.response_import.signals import signals_of
 from backend.response_import.units import scale_of
 
@@ -194,6 +195,15 @@ def test_a_constant_input_and_one_column_for_two_are_refused() -> None:
         read(text(), "1", "1", "2")
     with pytest.raises(BadRecording, match="occurs 2 times"):
         read(text(head="t,u,u\n"), "t", "u", "3")
+
+
+def test_a_signal_too_small_to_compute_with_is_refused_by_its_column() -> None:
+    rows = [f"{t:g},{1e-200 * u:.6g},{1e-200 * y:.6g}" for t, u, y in zip(T, U, Y, strict=True)]
+    data = ("t,u,y\n" + "\n".join(rows) + "\n").encode()
+    settings = ImportSettings(signal_in="u", signal_out="y", time="t")
+    with pytest.raises(BadRecording, match="'u' span") as error:
+        evaluate_file(data, "trace.csv", settings)
+    assert error.value.remedy
 
 
 def test_a_clock_in_few_digits_keeps_its_rate() -> None:
