@@ -130,16 +130,24 @@ def reevaluate(arrays: Arrays, meta: Meta) -> BrakeResult:
 def evaluate(test: Trials, settings: BrakeSettings, facts: AxisFacts) -> BrakeResult:
     """Result of both directions."""
     limit = settings.envelope.travel_rev
-    found = [_Way(trial, test, facts.rated_torque_nm, limit).judged() for trial in test.trials]
-    ways = tuple(way for way, _ in found)
-    verdict = _worst([way.verdict for way in ways])
-    least = min(way.torque_percent for way in ways)
+    each = [_Way(trial, test, facts.rated_torque_nm, limit) for trial in test.trials]
+    seen = [way for way in each if not way.lost()]
+    lost = len(seen) < len(each)
+    ways = tuple(way.judged()[0] for way in seen)
+    unknown: list[Verdict] = ["cannot_be_tested"] if lost else []
+    verdict = _worst([*(way.verdict for way in ways), *unknown])
+    least: float | None = min((way.torque_percent for way in ways), default=None)
+    if lost and verdict == "cannot_be_tested":
+        # The direction that was not seen may have carried less.
+        least = None
     rated = facts.rated_torque_nm if facts.torque_known else None
     of_brake = None
-    if rated is not None and settings.brake_rated_nm is not None:
+    if least is not None and rated is not None and settings.brake_rated_nm is not None:
         of_brake = least * rated / settings.brake_rated_nm
     obstacle: Obstacle | None = None
-    if verdict == "cannot_be_tested" and any(trial.halted for trial in test.trials):
+    if verdict == "cannot_be_tested" and lost:
+        obstacle = "samples_lost"
+    elif verdict == "cannot_be_tested" and any(trial.halted for trial in test.trials):
         obstacle = "windup_beyond_limit"
     return BrakeResult(
         verdict=verdict, obstacle=obstacle, means=test.means, measured_at=test.measured_at,
@@ -162,6 +170,8 @@ class _Way:
         self._asked = test.test_percent
         self._step = 100.0 * test.torque_step_nm / rated_nm
         start = self._still(trial.position_rad, Phase.LEAD)
+        if not np.any(trial.valid & (trial.phase == Phase.LEAD)) and np.any(trial.valid):
+            start = float(trial.position_rad[np.argmax(trial.valid)])
         self._travel = trial.direction * (trial.position_rad - start) / _TURN
         self._torque = 100.0 * trial.direction * trial.torque_nm / rated_nm
         lead = self._travel[(trial.phase == Phase.LEAD) & trial.valid]
@@ -179,6 +189,22 @@ class _Way:
         if not self._trial.halted or not np.any(sent):
             return sent.size
         return int(np.flatnonzero(sent)[-1]) + 1
+
+    def lost(self) -> bool:
+        """Whether what a verdict is read from was lost on the bus."""
+        phase, valid = self._trial.phase, self._trial.valid
+        reached = bool(np.any(phase >= Phase.RAMP))
+        needed = [Phase.LEAD, Phase.PRELOADED] if reached else []
+        if not self._trial.halted:
+            needed = [Phase.LEAD, Phase.PRELOADED, Phase.TOP, Phase.UNLOADED]
+        if any(not np.any(valid & (phase == each)) for each in needed):
+            return True
+        ramp, loaded = phase == Phase.RAMP, np.arange(phase.size) < self._end
+        if np.count_nonzero(ramp & valid & loaded) >= 2 * threshold.PARTS:
+            return False
+        # Of a halted ramp it is known where the torque was gone, not where it was.
+        gone = valid & (self._trial.sent_nm == 0.0)
+        return not self._trial.halted or np.count_nonzero(ramp & ~gone) >= 2 * threshold.PARTS
 
     def judged(self) -> tuple[BrakeWay, float]:
         """Result of the direction, and its compliance [revolutions per %]."""
@@ -231,7 +257,8 @@ class _Way:
     def _near(self, place: int) -> float:
         """Mean torque over the last `threshold.ONSET_S` before this sample [% of rated]."""
         begin = max(0, place - round(threshold.ONSET_S * self._rate))
-        return float(np.mean(self._torque[begin : place + 1]))
+        part = slice(begin, place + 1)
+        return float(np.mean(self._torque[part][self._trial.valid[part]]))
 
     def _made(
         self, verdict: Verdict, carried: float, ends: tuple[float, float], way: FloatArray,

@@ -19,6 +19,7 @@ Obstacle = Literal[
     "output_forced",
     "no_torque_mode",
     "windup_beyond_limit",
+    "samples_lost",
 ]
 """Reason why a brake cannot be tested; none where the drive did not reach the test torque."""
 Means = Literal["output", "supply"]

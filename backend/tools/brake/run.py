@@ -282,12 +282,10 @@ def _placed(
 ) -> Trial:  # fmt: skip
     """Assign to each sample the phase of the sequence that its cycle belongs to.
 
-    The sequence began at the first setpoint read back that differs from the one before the motion.
+    The sequence is found by its setpoints read back, wherever the first of them were lost.
     """
     cycles, values, valid = catch.rows()
-    went = np.flatnonzero(valid & (values[:, 2] != raw[0]))
-    begun = int(cycles[went[0]] if went.size else cycles[0]) - int(np.argmax(raw != raw[0]))
-    row = cycles - begun
+    row = cycles - _begun(cycles[valid], values[valid, 2], raw, int(cycles[0]))
     inside = (row >= 0) & (row < len(raw) + (0 if not halted else len(raw)))
     row, values, valid = row[inside], values[inside], valid[inside]
     nm = units.torque(1.0) / 100.0 * facts.rated_torque_nm
@@ -297,6 +295,32 @@ def _placed(
         torque_nm=values[:, 1] * nm, sent_nm=values[:, 2] * nm,
         phase=phases[np.clip(row, 0, len(raw) - 1)], valid=valid, halted=halted,
     )  # fmt: skip
+
+
+def _begun(
+    cycles: npt.NDArray[np.int64], sent: FloatArray, raw: npt.NDArray[np.int64], first: int
+) -> int:
+    """Cycle in which the sequence began, from the valid setpoints read back [n].
+
+    Of all places of the first setpoint that differs from the one before the motion it is the one
+    where the most of the others agree as well. ``first`` where none differs.
+    """
+    rises = int(np.argmax(raw != raw[0]))
+    went = np.flatnonzero(sent != raw[0])
+    if not went.size:
+        return first - rises
+    begins = int(cycles[went[0]])
+    places = np.flatnonzero(raw == sent[went[0]])
+    # A motion that ended by force has zero for its setpoint; that is no place in the sequence.
+    if not places.size or sent[went[0]] == 0.0:
+        return begins - rises
+
+    def agree(place: int) -> int:
+        row = cycles - (begins - place)
+        inside = (row >= 0) & (row < raw.size)
+        return int(np.count_nonzero(raw[row[inside]] == sent[inside]))
+
+    return begins - max(map(int, places), key=agree)
 
 
 TOOL = Tool(

@@ -135,6 +135,11 @@ TEXTS: dict[str, tuple[str, str]] = {
         "or test with less torque.",
         "轴的弹性扭转已达到打滑限值，但未打滑。请提高打滑限值，或以较小转矩测试。",
     ),
+    "obstacle.samples_lost": (
+        "Samples were lost on the bus during the test, so that nothing is known of the brake. "
+        "Secure the load, and repeat the test.",
+        "测试期间总线上丢失了采样，无法判断抱闸状况。请固定负载，然后重新测试。",
+    ),
     "crept": (
         "The shaft moved by {value} rev and did not come back: less than the slip limit.",
         "轴移动了 {value} 圈且未返回：低于打滑限值。",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -10,9 +11,10 @@ import pytest
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.brake.evaluate import Phase, Trial, Trials, evaluate, reevaluate
 from backend.tools.brake.result import BrakeResult
-from backend.tools.brake.run import sequence
+from backend.tools.brake.run import _Catch, _placed, sequence
 from backend.tools.brake.settings import BrakeSettings
 from backend.tools.brake.texts import TEXTS, report
+from drivers.link import ScopeBlock
 
 RATE, RATED_NM, TEST = 1000.0, 2.0, 100.0
 #: One revolution of windup at this many %: 0.005 rev at the test torque.
@@ -140,6 +142,76 @@ def test_a_brake_is_not_held_with_less_than_the_test_torque(share: float) -> Non
     assert found.torque_percent == pytest.approx(100.0 * share, abs=0.5)
     names = [note.name for note in report(found).notes]
     assert names == ["verdict.cannot_be_tested", "torque_short", "by.output", "measured_at"]
+
+
+def without(part: Trial, *phases: Phase, keeps: int = 0) -> Trial:
+    """The same with the samples of these phases lost, but for the first ``keeps`` of each."""
+    for phase in phases:
+        lost = np.flatnonzero(part.phase == phase)[keeps:]
+        part.valid[lost] = False
+        for column in (part.position_rad, part.torque_nm, part.sent_nm):
+            column[lost] = 0.0
+    return part
+
+
+@pytest.mark.parametrize("keeps", [0, 5])
+@pytest.mark.parametrize(
+    "lost", [Phase.LEAD, Phase.PRELOADED, Phase.RAMP, Phase.TOP, Phase.UNLOADED]
+)
+def test_nothing_is_said_of_a_brake_whose_samples_were_lost(lost: Phase, keeps: int) -> None:
+    if keeps and lost is not Phase.RAMP:
+        return
+    asked = ASKED.model_copy(update={"brake_rated_nm": 3.0})
+    found = found_of(without(trial(1), lost, keeps=keeps), trial(-1), asked=asked)
+    assert (found.verdict, found.obstacle) == ("cannot_be_tested", "samples_lost")
+    assert (found.torque_percent, found.of_brake_percent) == (None, None)
+    assert [way.verdict for way in found.ways] == ["held"]
+    names = [note.name for note in report(found).notes]
+    assert names == [
+        "verdict.cannot_be_tested", "obstacle.samples_lost", "by.output", "measured_at",
+    ]  # fmt: skip
+    assert set(names) <= TEXTS.keys()
+
+
+@pytest.mark.parametrize("slips_at", [40.0, 75.0])
+def test_a_way_to_the_limit_whose_ramp_was_lost_is_no_open_brake(slips_at: float) -> None:
+    found = found_of(without(trial(1, slips_at), Phase.RAMP, keeps=5))
+    assert (found.verdict, found.obstacle, found.ways) == ("cannot_be_tested", "samples_lost", ())
+    # The other direction slipped: that counts, whatever was lost before.
+    found = found_of(without(trial(1), Phase.RAMP), trial(-1, slips_at))
+    assert (found.verdict, found.obstacle) == ("slipped", None)
+    assert found.torque_percent == pytest.approx(slips_at, rel=0.05)
+
+
+def test_single_lost_samples_change_no_verdict() -> None:
+    parts = trial(1, 75.0), trial(-1)
+    for part in parts:
+        part.valid[::7] = False
+        part.torque_nm[::7] = part.position_rad[::7] = 0.0
+    found = found_of(*parts)
+    assert [way.verdict for way in found.ways] == ["slipped", "held"]
+    assert found.ways[0].torque_percent == pytest.approx(75.0, rel=0.05)
+
+
+@pytest.mark.parametrize("lost", [0, 1, 200, 1000])
+def test_samples_keep_their_phase_where_the_first_of_the_ramp_were_lost(lost: int) -> None:
+    """A ramp of 1 s from 10 % on, in steps of 0.1 %, of which the first samples did not arrive."""
+    percent, phases = sequence(TEST, 1.0, 0.3, RATE)
+    begins = int(np.argmax(phases == Phase.RAMP))
+    raw, phases = np.round(10.0 * percent[begins:]).astype(np.int64), phases[begins:]
+    before = 30
+    sent = np.concatenate([np.full(before, raw[0]), raw]).astype(np.float64)
+    rows = np.column_stack([np.arange(sent.size), sent, sent]).astype(np.float64)
+    valid = np.ones(sent.size, np.bool_)
+    valid[before : before + lost] = False
+    rows[~valid] = np.nan
+    names = ("position", "torque", "target")
+    catch = _Catch(names, [ScopeBlock(0, 0.0, 1 / RATE, names, rows, valid=valid, cycle=4000)])
+    units: Any = SimpleNamespace(torque=lambda _raw: 0.1, position=lambda _raw: 1e-4)
+    found = _placed(catch, raw, phases, units, FACTS, 1, False)
+    assert found.phase.tolist() == phases.tolist()
+    assert not found.valid[:lost].any()
+    assert found.valid[lost:].all()
 
 
 def test_of_the_brakes_rating_and_again_from_a_file() -> None:

@@ -4272,7 +4272,7 @@ export interface components {
              */
             measurements: string[];
             /** Obstacle */
-            obstacle?: ("means_unknown" | "built_in" | "fixed_output" | "bus_bit" | "no_output" | "output_inverted" | "output_forced" | "no_torque_mode" | "windup_beyond_limit") | null;
+            obstacle?: ("means_unknown" | "built_in" | "fixed_output" | "bus_bit" | "no_output" | "output_inverted" | "output_forced" | "no_torque_mode" | "windup_beyond_limit" | "samples_lost") | null;
             /**
              * Of Brake Percent
              * @description the same, in % of the brake's rated torque
