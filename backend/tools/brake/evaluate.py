@@ -204,7 +204,7 @@ class _Way:
             return False
         # Of a halted ramp it is known where the torque was gone, not where it was.
         gone = valid & (self._trial.sent_nm == 0.0)
-        return not self._trial.halted or np.count_nonzero(ramp & ~gone) >= 2 * threshold.PARTS
+        return not self._trial.halted or int(np.sum(ramp & ~gone)) >= 2 * threshold.PARTS
 
     def judged(self) -> tuple[BrakeWay, float]:
         """Result of the direction, and its compliance [revolutions per %]."""
