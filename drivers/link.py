@@ -95,7 +95,7 @@ class LinkEvent:
     code: int | None = None
 
 
-def tell(listeners: Iterable[Callable[[LinkEvent], None]], event: LinkEvent) -> None:
+def notify(listeners: Iterable[Callable[[LinkEvent], None]], event: LinkEvent) -> None:
     """Call each listener on the event loop's thread.
 
     One that fails is reported to the event loop, and keeps neither the bus nor the other listeners

@@ -23,9 +23,9 @@ from backend.commands.remote_params import remote_drive
 from backend.commands.session import drive_at, progress, run, run_in_order
 from backend.commands.state import state_folder
 from backend.drive.drive import Drive
-from backend.drive.identity import read_serial
+from backend.drive.identity import place_of, read_serial
 from backend.scales.scale import Scale, what_to_do
-from backend.scales.taught import Taught, TaughtDrive, place_of
+from backend.scales.taught import Taught, TaughtDrive
 from backend.store.files import write_atomically
 from drivers.texts.message import language
 
@@ -61,7 +61,7 @@ async def take_taught(axis: Axis, state: Path | None = None) -> None:
         return
     here = await _drive_here(axis.drive)
     # A file of an earlier version does not name the family; its name has the serial number.
-    same = here.serial is not None if taught.of is None else taught.of.is_of(here)
+    same = here.serial is not None if taught.drive is None else taught.drive.is_same(here)
     if same:
         axis.teach(taught)
     else:
@@ -80,7 +80,7 @@ async def _drive_here(drive: Drive) -> TaughtDrive:
 async def _keep(axis: Axis, taught: Taught | None, state: Path | None) -> None:
     path = await taught_file(axis.drive, state)
     if taught is not None:
-        taught = taught.model_copy(update={"of": await _drive_here(axis.drive)})
+        taught = taught.model_copy(update={"drive": await _drive_here(axis.drive)})
     axis.teach(taught)
     if taught is None:
         path.unlink(missing_ok=True)

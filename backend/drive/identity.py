@@ -41,3 +41,8 @@ async def confirm_identity(drive: Drive) -> None:
                 "drive.another-serial", drive=drive.name, known=str(known), serial=str(serial)
             )
     drive.require_identity()
+
+
+def place_of(url: str, station: int) -> tuple[str, int]:
+    """Return where a drive is connected: bus URL without line settings, and station."""
+    return url.partition("?")[0], station

@@ -236,7 +236,7 @@ class Leases:
         self._notify(giver.connection, drive, "returned", holder.person)
 
     def _set(self, drive: str, holder: Holder) -> Holder:
-        """Make somebody the holder; whoever else was asking is told that it is refused."""
+        """Make somebody the holder; whoever else asked receives the refusal."""
         self._holders[drive] = holder
         asked = self._asked.pop(drive, None)
         if asked is not None and asked.connection != holder.connection:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from backend.drive.drive import Drive
+from backend.drive.identity import place_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,5 +47,5 @@ def identity_of(drive: Drive) -> DriveIdentity:
         vendor_id=None if found is None else found.vendor_id or None,
         product_code=None if found is None else found.product_code or None,
         serial=None if found is None else found.serial or None,
-        places=tuple((port.link.url.partition("?")[0], port.station) for port in drive.ports),
+        places=tuple(place_of(port.link.url, port.station) for port in drive.ports),
     )

@@ -22,7 +22,7 @@ class TaughtDrive(BaseModel):
     serial: int | None = None
     places: tuple[tuple[str, int], ...] = ()
 
-    def is_of(self, other: TaughtDrive) -> bool:
+    def is_same(self, other: TaughtDrive) -> bool:
         """Whether both are the same drive: by serial number where both are known, else by place."""
         if self.profile != other.profile:
             return False
@@ -35,7 +35,7 @@ class Taught(BaseModel):
     """Scales of one axis, stated by a person or measured in a small motion.
 
     ``bound_to``: raw values of the drive (gear, feed, resolution, units) for which they hold; with
-    other values they are not used. ``of``: the drive itself; another one does not use them. None in
+    other values they are not used. ``drive``: the drive itself; another one does not use them. None in
     files of earlier versions.
     """
 
@@ -50,7 +50,7 @@ class Taught(BaseModel):
     bound_to: dict[str, int] = Field(
         default_factory=dict, description="raw values of the drive that it holds for"
     )
-    of: TaughtDrive | None = None
+    drive: TaughtDrive | None = None
 
     def holds(self, raws: Mapping[str, int]) -> bool:
         """Whether the drive still has the values for which these scales were stated."""
@@ -59,15 +59,10 @@ class Taught(BaseModel):
     @property
     def not_used(self) -> Text:
         """Why an axis does not use them: they are of another drive. A part of a sentence."""
-        of = self.of
+        of = self.drive
         return text(
             "scales.stated-for-another-drive",
             profile="-" if of is None else of.profile,
             serial="-" if of is None or of.serial is None else str(of.serial),
             place="-" if of is None or not of.places else "{}, {}".format(*of.places[0]),
         )
-
-
-def place_of(url: str, station: int) -> tuple[str, int]:
-    """The place of a drive, without settings of the line."""
-    return url.partition("?")[0], station

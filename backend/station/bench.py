@@ -15,14 +15,14 @@ from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
 from backend.axis.remembered import AxisStore
 from backend.drive.drive import Drive
-from backend.drive.identity import read_serial
+from backend.drive.identity import place_of, read_serial
 from backend.drive.ports import Port
 from backend.drive.readings import Reading
 from backend.library.measurements import MeasurementStore
 from backend.motion.authority import MotionAuthority
 from backend.people.lease import Leases
 from backend.restore.store import RestoreStore
-from backend.scales.taught import TaughtDrive, place_of
+from backend.scales.taught import TaughtDrive
 from backend.scope.hub import ScopeHub
 from backend.station.buses import Buses
 from backend.station.connected_drive import ConnectedDrive
@@ -283,13 +283,13 @@ class Bench:
         taught = self.axis_records.get(drive.id).scales
         if taught is None:
             return
-        if taught.of is not None and taught.of.is_of(self.taught_drive(drive, serial)):
+        if taught.drive is not None and taught.drive.is_same(self.taught_drive(drive, serial)):
             axis.teach(taught)
             return
         axis.teach(None, taught.not_used)
         line = text("journal.scales-not-used", drive=drive.name, not_used=taught.not_used)
         self.journal.add(line, level="warning", drive=drive.id)
-        if taught.of is None:
+        if taught.drive is None:
             # Of an earlier version, for a drive that is in the list no more: at the next start
             # they would be taken for those of this drive.
             self._forget_scales(drive.id)
@@ -303,13 +303,13 @@ class Bench:
             line = text("journal.scales-not-removed", drive=drive_id, cause=error.text)
             self.journal.add(line, level="error")
 
-    def _parted(self, drive_id: str) -> None:
-        """A drive leaves the list: without a serial number its scales cannot be told from others'.
+    def _forget_scales_without_serial(self, drive_id: str) -> None:
+        """Remove the scales of a drive that leaves the list, where it has no known serial number.
 
         The next drive of this name at this place may be another one.
         """
         taught = self.axis_records.get(drive_id).scales
-        if taught is not None and (taught.of is None or taught.of.serial is None):
+        if taught is not None and (taught.drive is None or taught.drive.serial is None):
             self._forget_scales(drive_id)
 
     def _may_turn(self, drive_id: str) -> bool:
@@ -353,7 +353,7 @@ class Bench:
             connected.drive.pending_restores.settle(
                 [entry.key for entry in connected.drive.pending_restores.entries]
             )
-            self._parted(drive_id)
+            self._forget_scales_without_serial(drive_id)
         await connected.monitor.close()
         self._remember()
         self.drives_changed()
@@ -372,7 +372,7 @@ class Bench:
         except StorageFailed:
             self._unreached = before
             raise
-        self._parted(missing.id)
+        self._forget_scales_without_serial(missing.id)
 
     def rename(self, drive_id: str, name: str | None, notes: str | None) -> ConnectedDrive:
         """Change name or notes; None leaves them unchanged.
@@ -487,7 +487,7 @@ class Bench:
         taken = {port for drive in here for port in drive.ports}
         for each in [each for each in self._unreached if taken & set(each.ports)]:
             self._unreached.remove(each)
-            self._parted(each.id)
+            self._forget_scales_without_serial(each.id)
         self._list.store([*here, *self._unreached])
 
     def _ports_of(self, drive: Drive) -> tuple[SavedPort, ...]:
@@ -506,25 +506,25 @@ class Bench:
             self.journal.add(problem, level="error")
         self._restoring = True
         self._unreached = _with_ids(saved)
-        self._own_scales()
+        self._complete_scales()
         try:
             for item in list(self._unreached):
                 await self._restore_drive(item)
         finally:
             self._restoring = False
 
-    def _own_scales(self) -> None:
+    def _complete_scales(self) -> None:
         """State in scales of earlier versions the drive of the list that they were used for."""
         for item in self._unreached:
             record = self.axis_records.get(item.id)
-            if record.scales is None or record.scales.of is not None:
+            if record.scales is None or record.scales.drive is not None:
                 continue
-            of = TaughtDrive(
+            drive = TaughtDrive(
                 profile=item.profile,
                 serial=item.serial,
                 places=tuple(place_of(port.url, port.station) for port in item.ports),
             )
-            scales = record.scales.model_copy(update={"of": of})
+            scales = record.scales.model_copy(update={"drive": drive})
             with contextlib.suppress(StorageFailed):
                 self.axis_records.put(item.id, record.model_copy(update={"scales": scales}))
 

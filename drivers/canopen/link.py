@@ -50,7 +50,7 @@ from drivers.link import (
     Progress,
     Unsubscribe,
     lists_nothing,
-    tell,
+    notify,
 )
 from drivers.texts.message import Text, text
 from profiles.schema import LinkKind, Profile
@@ -450,7 +450,7 @@ class CanopenLink:
             loop.call_soon_threadsafe(self._notify, event)
 
     def _notify(self, event: LinkEvent) -> None:
-        tell(self._listeners, event)
+        notify(self._listeners, event)
 
 
 def _object(address: Address) -> tuple[int, int]:

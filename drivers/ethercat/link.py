@@ -40,7 +40,7 @@ from drivers.link import (
     LinkQuality,
     Progress,
     Unsubscribe,
-    tell,
+    notify,
 )
 from drivers.texts.message import Text, prose, text
 from profiles.schema import LinkKind, Profile
@@ -423,7 +423,7 @@ class EthercatLink:
     def _notify(self, event: LinkEvent) -> None:
         self.recorder.note(f"{event.kind}: {event.text.words()}", event.station)
         # An error raised here would be taken for a fault of the host process, which is replaced.
-        tell(self._listeners, event)
+        notify(self._listeners, event)
 
 
 def _found(item: Message) -> Found:

@@ -34,7 +34,7 @@ from drivers.link import (
     Progress,
     Unsubscribe,
     lists_nothing,
-    tell,
+    notify,
 )
 from drivers.modbus.framing import BUSY, NOT_REACHED
 from drivers.modbus.layout import Layout, TableLayout
@@ -347,7 +347,7 @@ class RegisterLink:
     def _notify(self, up: bool, why: Text) -> None:
         if self._thread is None:
             return
-        tell(self._listeners, LinkEvent("back" if up else "lost", None, why))
+        notify(self._listeners, LinkEvent("back" if up else "lost", None, why))
         if not up and (self._watcher is None or self._watcher.done()):
             self._watcher = asyncio.ensure_future(self._watch())
 

@@ -123,10 +123,10 @@ async def _keep(bench: Bench, connected: ConnectedDrive, taught: Taught | None) 
     old = store.get(drive.id)
     note_before(scales=None if old.scales is None else old.scales.model_dump())
     if taught is not None:
-        of = bench.taught_drive(drive)
-        if of.serial is None:
-            of = bench.taught_drive(drive, await read_serial(drive))
-        taught = taught.model_copy(update={"of": of})
+        found = bench.taught_drive(drive)
+        if found.serial is None:
+            found = bench.taught_drive(drive, await read_serial(drive))
+        taught = taught.model_copy(update={"drive": found})
     with bench.motion.keeping_still(connected):
         store.put(drive.id, old.model_copy(update={"scales": taught}))
         connected.axis.teach(taught)

@@ -8,7 +8,7 @@ import asyncio
 async def end_task(task: asyncio.Task[None]) -> None:
     """Cancel a task and return when it has ended.
 
-    ``await task`` cannot tell the two cancellations apart: that of the caller would be lost.
+    ``await task`` does not distinguish the two cancellations: that of the caller would be lost.
 
     Raises:
         asyncio.CancelledError: the caller was cancelled meanwhile; the task has ended nevertheless.

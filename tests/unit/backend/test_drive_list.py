@@ -251,7 +251,7 @@ async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Pa
     second = bench.connected("drive-2").drive
     assert second.name == "轴二"
     of = bench.taught_drive(bench.connected("drive").drive)
-    taught = Taught(counts_per_rev=1000.0, of=of)
+    taught = Taught(counts_per_rev=1000.0, drive=of)
     bench.axis_records.put("drive", AxisRecord(scales=taught))
     bench.rename("drive-2", None, "stored")
     await bench.close()
@@ -297,7 +297,7 @@ def _scales_bench(folder: Path) -> Bench:
 
 def _state(bench: Bench, drive_id: str) -> None:
     connected = bench.connected(drive_id)
-    taught = STATED.model_copy(update={"of": bench.taught_drive(connected.drive)})
+    taught = STATED.model_copy(update={"drive": bench.taught_drive(connected.drive)})
     bench.axis_records.put(drive_id, AxisRecord(scales=taught))
     connected.axis.teach(taught)
 
@@ -382,8 +382,8 @@ async def test_scales_of_earlier_versions_stay_with_the_drive_of_the_list(tmp_pa
     try:
         taught = bench.connected("x").axis.taught
         assert taught is not None
-        assert taught.of is not None
-        assert taught.of.serial == 7
+        assert taught.drive is not None
+        assert taught.drive.serial == 7
         # Nobody knows for which drive the others were stated.
         other = await bench.connect(P1, 1, "generic402", "Y")
         assert other.drive.id == "y"

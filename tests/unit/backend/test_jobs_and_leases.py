@@ -116,31 +116,31 @@ def test_leases() -> None:
     assert reported == ["x", "x"]
 
 
-def test_who_asks_is_told_when_somebody_else_gets_control() -> None:
+def test_who_asks_is_informed_when_somebody_else_gets_control() -> None:
     now = 0.0
     notices: list[Notice] = []
     leases = Leases(ticks=lambda: now)
     leases.on_notice.append(notices.append)
 
-    def told(connection: str) -> list[tuple[str, str]]:
+    def received(connection: str) -> list[tuple[str, str]]:
         return [(each.kind, each.person) for each in notices if each.connection == connection]
 
     leases.take("x", "c1", "Anna")
     leases.ask("x", "c2", "Ben")
     leases.hand("x", "c1", "c3", "Cara", 60.0)
     assert leases.asked("x") is None
-    assert told("c2") == [("refused", "Cara")]
+    assert received("c2") == [("refused", "Cara")]
     leases.ask("x", "c2", "Ben")
     leases.override("x", "c4", "Dora")
-    assert told("c2")[1:] == [("refused", "Dora")]
+    assert received("c2")[1:] == [("refused", "Dora")]
     leases.ask("x", "c2", "Ben")
     leases.hand("x", "c4", "c2", "Ben", 5.0)
-    assert told("c2")[2:] == [("given", "Dora")]
+    assert received("c2")[2:] == [("given", "Dora")]
     leases.ask("x", "c3", "Cara")
     now = 6.0
     leases.tick(lambda _drive: False)
     assert leases.holder("x") is not None
-    assert told("c3")[-1] == ("refused", "Dora"), "control returned to the giver"
+    assert received("c3")[-1] == ("refused", "Dora"), "control returned to the giver"
 
 
 def test_who_asks_gets_control_that_cannot_return() -> None:

@@ -229,11 +229,11 @@ async def test_a_state_that_cannot_be_formed_is_not_shown_as_the_present_one(
     await x.monitor.refresh()
     assert x.monitor.snapshot.fresh
     sent: list[watching.Snapshot] = []
-    told = asyncio.Event()
+    arrived = asyncio.Event()
 
     def changed(snapshot: watching.Snapshot) -> None:
         sent.append(snapshot)
-        told.set()
+        arrived.set()
         raise KeyError("and so does what listens")
 
     def broken(*_arguments: object) -> None:
@@ -243,10 +243,10 @@ async def test_a_state_that_cannot_be_formed_is_not_shown_as_the_present_one(
     monkeypatch.setattr(watching, "active_faults", broken)
     x.monitor.start()
     async with asyncio.timeout(10):
-        await told.wait()
-        told.clear()
+        await arrived.wait()
+        arrived.clear()
         x.monitor.hurry()
-        await told.wait()
+        await arrived.wait()
     await x.monitor.close()
     assert [snapshot.fresh for snapshot in sent] == [False, False]
     assert sent[0].problem is not None

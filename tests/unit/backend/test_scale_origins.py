@@ -324,7 +324,7 @@ async def test_a_command_uses_no_scales_of_another_family_at_the_same_place(tmp_
         (TaughtDrive(profile="ds_c", places=places), False),
         (None, False),  # as earlier versions stored them
     ):
-        file.write_text(Taught(counts_per_rev=2_000.0, of=of).model_dump_json(), "utf-8")
+        file.write_text(Taught(counts_per_rev=2_000.0, drive=of).model_dump_json(), "utf-8")
         await take_taught(axis, tmp_path)
         assert (axis.taught is not None) == counts
     with pytest.raises(ScaleUnknown, match="stated for another drive"):
