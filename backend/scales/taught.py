@@ -35,8 +35,8 @@ class Taught(BaseModel):
     """Scales of one axis, stated by a person or measured in a small motion.
 
     ``bound_to``: raw values of the drive (gear, feed, resolution, units) for which they hold; with
-    other values they are not used. ``drive``: the drive itself; another one does not use them. None in
-    files of earlier versions.
+    other values they are not used. ``drive``: the drive itself; another one does not use
+    them. None in files of earlier versions.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
