@@ -1,3 +1,4 @@
+import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
@@ -22,17 +23,16 @@ export function CurvesPlot({
   xLabel,
   yLabel,
   label,
-  dark,
   dates = false,
 }: {
   curves: PlottedCurve[]
   xLabel: string
   yLabel: string
   label: string
-  dark: boolean
   /** The common quantity is a moment, in seconds since the epoch. */
   dates?: boolean
 }) {
+  const scheme = useComputedColorScheme('light')
   const box = useRef<HTMLDivElement>(null)
   useEffect(() => {
     const element = box.current
@@ -45,7 +45,7 @@ export function CurvesPlot({
       observer.disconnect()
       plot.destroy()
     }
-  }, [curves, xLabel, yLabel, dark, dates])
+  }, [curves, xLabel, yLabel, scheme, dates])
   return <div ref={box} className="lines-plot" role="img" aria-label={label} />
 }
 

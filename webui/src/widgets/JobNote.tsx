@@ -122,3 +122,12 @@ export function useJobEnd(id: string | null, ended: (job: JobInfo) => void): voi
     // Only the end itself counts, not every new closure.
   }, [over, id])
 }
+
+/** Calls back when one of these jobs is over, once for each. */
+export function useJobEnds(jobs: ReadonlyMap<string, JobInfo>, ended: () => void): void {
+  const over = [...jobs.values()].filter((each) => each.state !== 'running').map((each) => each.id)
+  useEffect(() => {
+    if (over.length > 0) ended()
+    // Only the ends themselves count, not every new closure.
+  }, [over.join()])
+}

@@ -13,7 +13,6 @@ import type {
   SweepAnswer,
   VerdictInfo,
 } from '../../api/schema'
-import { outcome } from '../../api/results'
 
 export type Resonance = Partial<ResonanceInfo> &
   Omit<ResonanceInfo, 'frequency_ci95_hz' | 'damping_ci95'>
@@ -92,11 +91,6 @@ export const asSweep = (value: unknown): Sweep | null =>
 
 export const asInertia = (value: unknown): Inertia | null =>
   has(value, 'inertia_kgm2', 'ci95', 'verdict') ? (value as Inertia) : null
-
-export const asStep = (result: unknown): StepAnswer | null => {
-  const found = outcome(result)
-  return found?.tool === 'step' ? found : null
-}
 
 export const asAutotune = (value: unknown): Autotune | null =>
   has(value, 'mechanics', 'candidates', 'before') ? (value as Autotune) : null

@@ -10,12 +10,12 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
-import type { Limits } from '../response/limits'
 import { asAutotune } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
 import { AutotuneReport } from './AutotuneReport'
 import { SchemeFields, useScheme } from './schemes'
 import { stepOf } from './steps'
+import type { Measured } from './ToolPanel'
 
 const MARKS = ['robust', 'balanced', 'fast'] as const
 const LOADS = ['auto', 'stiff', 'medium', 'compliant'] as const
@@ -30,13 +30,8 @@ export function AutotunePanel({
   cycleMs,
   now,
   onChanged,
-}: {
-  drive: string
+}: Measured & {
   state: AxisState | null
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
   /** Gains that the drive holds now, raw. */
   now: Record<string, number> | null
   onChanged: () => void

@@ -1,109 +1,39 @@
-import { useComputedColorScheme } from '@mantine/core'
-import { useEffect, useMemo, useState } from 'react'
-import { api, ask } from '../../api/client'
-import { asBrakeTest } from '../../api/results'
-import type { BrakeResult, BrakeSettings } from '../../api/schema'
-import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
+import { useMemo } from 'react'
+import { resultOf } from '../../api/results'
+import type { BrakeResult } from '../../api/schema'
 import { CurvesPlot } from '../../plots/CurvesPlot'
-import { JobNote } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { StartButton } from '../../widgets/StartButton'
-import { useAction } from '../../widgets/useAction'
-import type { Limits } from '../response/limits'
-import { useToolJob } from '../response/useToolJob'
-import { amount, engineering } from './steps'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
+import { Notes, useCurveColors, ValuesTable } from './Answer'
+import type { ShownNote, ShownRow, Text } from './shown'
+import { engineering } from './steps'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
-type Text = (name: string, values?: Record<string, string>) => string
-
-/** What a person states about one test; undone after it. */
+/** What a person states about one test; cleared after it. */
 const STATED = ['brake_supply_cut', 'nothing_hangs', 'load_supported'] as const
 /** Below this share of its limit slip is what an encoder and a settling hub show. */
 const CREPT = 0.05
 const SHORT = 0.95
 
 /** Torque against the closed brake: dangers first, then what hangs, then the start. */
-export function BrakePanel({
-  drive,
-  limits,
-  obstacle,
-  cycleMs,
-}: {
-  drive: string
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
-  const t = useT()
-  const { tool, text } = useTool('brake-test')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
-  const { job, note, dismiss } = useToolJob(drive, 'brake-test')
-  const begun = job?.id ?? ''
-  useEffect(() => setValues(initialValues(fields)), [fields, drive])
-  // Stated for one test, never for the next.
-  useEffect(
-    () => setValues((old) => ({ ...old, ...Object.fromEntries(STATED.map((n) => [n, false])) })),
-    [begun],
-  )
-  const start = useAction()
-  const result = asBrakeTest(job?.result)
-  if (!tool) return null
+export function BrakePanel(measured: Measured) {
+  const run = useToolRun('brake-test', measured.drive, { stated: STATED })
+  const { text, values } = run
+  const result = resultOf('brake-test', run.job?.result)
   const stated = values.nothing_hangs === true || values.load_supported === true
-  const go = () =>
-    start.run(async () => {
-      if (!limits) return
-      const body = { ...limits, cycle_ms: cycleMs, ...values } as BrakeSettings
-      setJob(
-        await ask(
-          api.POST('/api/v1/drives/{drive_id}/jobs/brake-test', {
-            params: { path: { drive_id: drive } },
-            body,
-          }),
-        ),
-      )
-    })
-  const missing = complete(fields, values)
-    ? stated
-      ? null
-      : text('state_first')
-    : t('start.incomplete')
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
+    <ToolPanel run={run} answer={result && <BrakeAnswer result={result} text={text} />}>
       <p className="note warn">{text('danger')}</p>
       <p className="note warn">{text('warning')}</p>
       <p>{text('step.support')}</p>
       <p>{text('step.clear')}</p>
       <p>{text('step.state')}</p>
-      <ToolForm
-        tool={tool}
-        limits={limits}
-        fields={fields}
-        values={values}
-        text={text}
-        onChange={setValues}
-      />
-      <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
-        {text('start')}
-      </StartButton>
-      <ProblemNote problem={start.problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {result && <BrakeAnswer result={result} text={text} />}
-    </Panel>
+      <MeasuredStart run={run} measured={measured} missing={stated ? null : text('state_first')} />
+    </ToolPanel>
   )
 }
 
-const COLORS = { light: ['#1a5c94', '#c2571a'], dark: ['#6db3f2', '#f0a060'] } as const
-
 /** Verdict, both directions side by side, and travel over torque. */
-export function BrakeAnswer({ result, text }: { result: BrakeResult; text: Text }) {
-  const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
-  const [first, second] = COLORS[dark ? 'dark' : 'light']
+function BrakeAnswer({ result, text }: { result: BrakeResult; text: Text }) {
+  const [first, second] = useCurveColors()
   const curves = useMemo(
     () =>
       result.ways.map((way) => ({
@@ -116,47 +46,18 @@ export function BrakeAnswer({ result, text }: { result: BrakeResult; text: Text 
   )
   return (
     <>
-      {notesOf(result, text).map((each) => (
-        <p key={each.words} className={`note ${each.tone}`}>
-          {each.words}
-        </p>
-      ))}
+      <Notes notes={notesOf(result, text)} />
       {curves.some((each) => each.x.length > 0) && (
         <CurvesPlot
           curves={curves}
           xLabel={text('chart_torque')}
           yLabel={text('chart_travel')}
           label={text('chart')}
-          dark={dark}
         />
       )}
-      {result.ways.length > 0 && (
-        <div className="scroll-table">
-          <table className="reported-values" aria-label={text('title')}>
-            <thead>
-              <tr>
-                <th>{t('inertia.quantity')}</th>
-                <th className="right">{t('inertia.value')}</th>
-              </tr>
-            </thead>
-            <tbody className="num">
-              {rowsOf(result, text).map((row) => (
-                <tr key={row.name}>
-                  <td>{row.name}</td>
-                  <td className="right">{amount(row.value, row.unit)}</td>
-                </tr>
-              ))}
-            </tbody>
-          </table>
-        </div>
-      )}
+      {result.ways.length > 0 && <ValuesTable rows={rowsOf(result, text)} label={text('title')} />}
     </>
   )
-}
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
 }
 
 /** The verdict first, then why, how the brake was kept closed, and when. */
@@ -181,12 +82,6 @@ export function notesOf(result: BrakeResult, text: Text): ShownNote[] {
   const at = result.measured_at.slice(0, 19).replace('T', ' ')
   found.push({ words: text('measured_at', { at }), tone: 'info' })
   return found
-}
-
-interface ShownRow {
-  name: string
-  value: number
-  unit: string
 }
 
 /** In Nm where the rated torque is known, else in % of it. */

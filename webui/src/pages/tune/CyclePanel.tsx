@@ -1,83 +1,46 @@
-import { useComputedColorScheme } from '@mantine/core'
+import { NativeSelect } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { api, ask } from '../../api/client'
-import { asCycle } from '../../api/results'
-import type { CycleResult, CycleSettings } from '../../api/schema'
+import { resultOf } from '../../api/results'
+import type { CycleResult } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
 import { CurvesPlot } from '../../plots/CurvesPlot'
-import { JobNote } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { StartButton } from '../../widgets/StartButton'
-import { useAction } from '../../widgets/useAction'
-import { useToolJob } from '../response/useToolJob'
+import { Notes, useCurveColors, ValuesTable } from './Answer'
 import { cycleNotes, cycleRows } from './cycle'
-import { amount, interval } from './steps'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
-
-type Text = (name: string, values?: Record<string, string>) => string
+import type { Text } from './shown'
+import { ToolPanel, ToolStart, useToolRun } from './ToolPanel'
 
 /** The load of the machine's own cycle. Nothing moves, so nothing is agreed to before. */
 export function CyclePanel({ drive, open }: { drive: string; open: boolean }) {
   const t = useT()
-  const { tool, text } = useTool('cycle')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
-  useEffect(() => setValues(initialValues(fields)), [fields])
+  const run = useToolRun('cycle', drive)
+  const { text, job } = run
   const [recording, setRecording] = useState('')
   const names = useRecordingNames(open)
-  const { job, note, dismiss } = useToolJob(drive, 'cycle')
-  const start = useAction()
-  const result = asCycle(job?.result)
-  if (!tool) return null
-  const go = () =>
-    start.run(async () => {
-      const body = { ...values, recording: recording || null } as CycleSettings
-      setJob(
-        await ask(
-          api.POST('/api/v1/drives/{drive_id}/jobs/cycle', {
-            params: { path: { drive_id: drive } },
-            body,
-          }),
-        ),
-      )
-    })
+  const result = resultOf('cycle', job?.result)
+  const recorded = recording !== ''
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
-      <label className="field">
-        <span>{text('source')}</span>
-        <select value={recording} onChange={(event) => setRecording(event.target.value)}>
-          <option value="">{text('source.drive')}</option>
-          {names.map((name) => (
-            <option key={name} value={name}>
-              {name}
-            </option>
-          ))}
-        </select>
-      </label>
-      <ToolForm
-        tool={tool}
-        limits={null}
-        fields={fields.filter((each) => each.name !== 'duration_s' || recording === '')}
-        values={values}
-        text={text}
-        onChange={setValues}
+    <ToolPanel run={run} answer={result && <CycleAnswer result={result} text={text} />}>
+      <div className="fields wide">
+        <NativeSelect
+          label={text('source')}
+          value={recording}
+          onChange={(event) => setRecording(event.currentTarget.value)}
+          data={[
+            { value: '', label: text('source.drive') },
+            ...names.map((name) => ({ value: name, label: name })),
+          ]}
+        />
+      </div>
+      <ToolStart
+        run={run}
+        obstacle={open ? null : t('start.noConnection')}
+        busy={job?.state === 'running'}
+        label={recorded ? 'evaluate' : 'start'}
+        {...(recorded ? { without: 'duration_s' } : {})}
+        onStart={() => run.begin({ ...run.values, recording: recording || null })}
       />
-      <StartButton
-        obstacle={
-          !open ? t('start.noConnection') : complete(fields, values) ? null : t('start.incomplete')
-        }
-        busy={start.busy || job?.state === 'running'}
-        onStart={() => void go()}
-      >
-        {text(recording === '' ? 'start' : 'evaluate')}
-      </StartButton>
-      <ProblemNote problem={start.problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {result && <CycleAnswer result={result} text={text} />}
-    </Panel>
+    </ToolPanel>
   )
 }
 
@@ -98,13 +61,9 @@ function useRecordingNames(open: boolean): string[] {
   return names
 }
 
-const COLORS = { light: ['#1a5c94', '#c2571a'], dark: ['#6db3f2', '#f0a060'] } as const
-
 /** Verdict and findings, torque over speed with its limits, and the figures. */
-export function CycleAnswer({ result, text }: { result: CycleResult; text: Text }) {
-  const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
-  const [first, second] = COLORS[dark ? 'dark' : 'light']
+function CycleAnswer({ result, text }: { result: CycleResult; text: Text }) {
+  const [first, second] = useCurveColors()
   const curves = useMemo(() => {
     const { cloud_speed_rpm: x, cloud_torque_percent: y } = result
     const ends = [x[0] ?? 0, x.at(-1) ?? 1]
@@ -124,39 +83,14 @@ export function CycleAnswer({ result, text }: { result: CycleResult; text: Text 
   }, [result, first, second])
   return (
     <>
-      {cycleNotes(result, text).map((each) => (
-        <p key={each.words} className={`note ${each.tone}`}>
-          {each.words}
-        </p>
-      ))}
+      <Notes notes={cycleNotes(result, text)} />
       <CurvesPlot
         curves={curves}
         xLabel={text('speed')}
         yLabel={text('torque')}
         label={text('cloud')}
-        dark={dark}
       />
-      <div className="scroll-table">
-        <table className="reported-values" aria-label={text('title')}>
-          <thead>
-            <tr>
-              <th>{t('inertia.quantity')}</th>
-              <th className="right">{t('inertia.value')}</th>
-            </tr>
-          </thead>
-          <tbody className="num">
-            {cycleRows(result, text).map((row) => (
-              <tr key={row.name}>
-                <td>{row.name}</td>
-                <td className="right">
-                  {amount(row.value, row.value === null ? '' : row.unit)}
-                  <small className="dim interval">{interval(row.ends)}</small>
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ValuesTable rows={cycleRows(result, text)} label={text('title')} />
     </>
   )
 }

@@ -1,99 +1,40 @@
-import { useComputedColorScheme } from '@mantine/core'
-import { useEffect, useMemo, useState } from 'react'
-import { api, ask } from '../../api/client'
-import { asFirstPower } from '../../api/results'
-import type { FirstPowerResult, FirstPowerSettings } from '../../api/schema'
-import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
+import { useMemo } from 'react'
+import { resultOf } from '../../api/results'
+import type { FirstPowerResult } from '../../api/schema'
 import { CurvesPlot } from '../../plots/CurvesPlot'
-import { JobNote } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { StartButton } from '../../widgets/StartButton'
-import { useAction } from '../../widgets/useAction'
-import { useToolJob } from '../response/useToolJob'
+import { useCurveColors } from './Answer'
+import type { Text } from './shown'
 import { amount } from './steps'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
-
-type Text = (name: string, values?: Record<string, string>) => string
+import { type Measured, ToolPanel, ToolStart, useToolRun } from './ToolPanel'
 
 /** What a person states about one run; cleared after it. */
 const STATED = ['nothing_hangs', 'load_supported'] as const
 
 /** The checklist before the first closed loop. Its limits are its own: 10 % and 0.1 rev at most. */
-export function FirstPowerPanel({
-  drive,
-  obstacle,
-  cycleMs,
-}: {
-  drive: string
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
-  const t = useT()
-  const { tool, text } = useTool('first-power')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
-  const { job, note, dismiss } = useToolJob(drive, 'first-power')
-  const begun = job?.id ?? ''
-  useEffect(() => setValues(initialValues(fields)), [fields, drive])
-  // Stated for one run, never for the next.
-  useEffect(
-    () => setValues((old) => ({ ...old, ...Object.fromEntries(STATED.map((n) => [n, false])) })),
-    [begun],
-  )
-  const start = useAction()
-  const result = asFirstPower(job?.result)
-  if (!tool) return null
+export function FirstPowerPanel({ drive, obstacle, cycleMs }: Omit<Measured, 'limits'>) {
+  const run = useToolRun('first-power', drive, { stated: STATED })
+  const { text, values } = run
+  const result = resultOf('first-power', run.job?.result)
   const stated = STATED.some((name) => values[name] === true) || values.powered !== true
-  const go = () =>
-    start.run(async () => {
-      const body = { cycle_ms: cycleMs, ...values } as FirstPowerSettings
-      setJob(
-        await ask(
-          api.POST('/api/v1/drives/{drive_id}/jobs/first-power', {
-            params: { path: { drive_id: drive } },
-            body,
-          }),
-        ),
-      )
-    })
-  const missing = complete(fields, values)
-    ? stated
-      ? null
-      : text('state_first')
-    : t('start.incomplete')
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
+    <ToolPanel run={run} answer={result && <FirstPowerAnswer result={result} text={text} />}>
       <p className="note warn">{text('danger')}</p>
       <p className="note warn">{text('warning')}</p>
-      <ToolForm
-        tool={tool}
-        limits={null}
-        fields={fields}
-        values={values}
-        text={text}
-        onChange={setValues}
+      <ToolStart
+        run={run}
+        obstacle={obstacle}
+        missing={stated ? null : text('state_first')}
+        onStart={() => run.begin({ cycle_ms: cycleMs, ...values })}
       />
-      <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
-        {text('start')}
-      </StartButton>
-      <ProblemNote problem={start.problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {result && <FirstPowerAnswer result={result} text={text} />}
-    </Panel>
+    </ToolPanel>
   )
 }
 
-const COLORS = { light: ['#1a5c94', '#c2571a'], dark: ['#6db3f2', '#f0a060'] } as const
 const TONES = { passed: 'good', failed: 'warn', open: 'info' } as const
 
 /** Verdict, one line for each check, and where the pulses turned the shaft. */
-export function FirstPowerAnswer({ result, text }: { result: FirstPowerResult; text: Text }) {
-  const dark = useComputedColorScheme('light') === 'dark'
-  const [first, second] = COLORS[dark ? 'dark' : 'light']
+function FirstPowerAnswer({ result, text }: { result: FirstPowerResult; text: Text }) {
+  const [first, second] = useCurveColors()
   const curves = useMemo(() => {
     const numbered = result.pulses.map((pulse, at) => ({ ...pulse, number: at + 1 }))
     return ([1, -1] as const).map((way) => {
@@ -130,7 +71,6 @@ export function FirstPowerAnswer({ result, text }: { result: FirstPowerResult; t
             xLabel={text('chart_number')}
             yLabel={text('chart_place')}
             label={text('chart')}
-            dark={dark}
           />
           <p className="dim">
             {text('travel')}: {amount(result.travel_rev, 'rev')}; {text('torque')}:{' '}

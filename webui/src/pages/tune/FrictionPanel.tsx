@@ -1,94 +1,32 @@
-import { Button, useComputedColorScheme } from '@mantine/core'
-import { useEffect, useMemo, useState } from 'react'
-import { api, ask } from '../../api/client'
-import { asFriction } from '../../api/results'
-import type { FrictionResult, FrictionSettings } from '../../api/schema'
-import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
+import { Button } from '@mantine/core'
+import { useMemo } from 'react'
+import { resultOf } from '../../api/results'
+import type { FrictionResult } from '../../api/schema'
 import { CurvesPlot } from '../../plots/CurvesPlot'
 import { Icon } from '../../widgets/Icon'
-import { JobNote } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { StartButton } from '../../widgets/StartButton'
-import { useAction } from '../../widgets/useAction'
 import { offerDownload } from '../files/sets'
-import type { Limits } from '../response/limits'
-import { useToolJob } from '../response/useToolJob'
+import { useCurveColors, ValuesTable } from './Answer'
 import { compensationCsv } from './friction'
-import { amount, engineering, interval } from './steps'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
+import type { Ends, ShownRow, Text } from './shown'
+import { engineering } from './steps'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
-type Text = (name: string, values?: Record<string, string>) => string
-
-/** Torque over speed and over position; form and words are the tool's own, from the server. */
-export function FrictionPanel({
-  drive,
-  limits,
-  obstacle,
-  cycleMs,
-}: {
-  drive: string
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
-  const t = useT()
-  const { tool, text } = useTool('friction')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
-  useEffect(() => setValues(initialValues(fields)), [fields])
-  const { job, note, dismiss } = useToolJob(drive, 'friction')
-  const start = useAction()
-  const result = asFriction(job?.result)
-  if (!tool) return null
-  const go = () =>
-    start.run(async () => {
-      if (!limits) return
-      const body = { ...limits, cycle_ms: cycleMs, ...values } as FrictionSettings
-      setJob(
-        await ask(
-          api.POST('/api/v1/drives/{drive_id}/jobs/friction', {
-            params: { path: { drive_id: drive } },
-            body,
-          }),
-        ),
-      )
-    })
+/** Torque over speed and over position; form and texts are the tool's own, from the server. */
+export function FrictionPanel(measured: Measured) {
+  const run = useToolRun('friction', measured.drive)
+  const result = resultOf('friction', run.job?.result)
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
-      <ToolForm
-        tool={tool}
-        limits={limits}
-        fields={fields}
-        values={values}
-        text={text}
-        onChange={setValues}
-      />
-      <StartButton
-        obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
-        busy={start.busy}
-        onStart={() => void go()}
-      >
-        {text('start')}
-      </StartButton>
-      <ProblemNote problem={start.problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {result && <FrictionMap result={result} text={text} />}
-    </Panel>
+    <ToolPanel run={run} answer={result && <FrictionMap result={result} text={run.text} />}>
+      <MeasuredStart run={run} measured={measured} />
+    </ToolPanel>
   )
 }
 
-const COLORS = { light: ['#1a5c94', '#c2571a'], dark: ['#6db3f2', '#f0a060'] } as const
 const RPM_PER_RAD_S = 60 / (2 * Math.PI)
 
 /** Findings, curves, parameters with their intervals, and the ripple's harmonics. */
-export function FrictionMap({ result, text }: { result: FrictionResult; text: Text }) {
-  const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
-  const [first, second] = COLORS[dark ? 'dark' : 'light']
+function FrictionMap({ result, text }: { result: FrictionResult; text: Text }) {
+  const [first, second] = useCurveColors()
   const overSpeed = useMemo(() => {
     const { points } = result
     return [
@@ -126,7 +64,6 @@ export function FrictionMap({ result, text }: { result: FrictionResult; text: Te
         xLabel={text('speed')}
         yLabel={text('torque')}
         label={text('over_speed')}
-        dark={dark}
       />
       {result.ripple_angle_deg.length > 0 && (
         <CurvesPlot
@@ -134,7 +71,6 @@ export function FrictionMap({ result, text }: { result: FrictionResult; text: Te
           xLabel={text('angle')}
           yLabel={text('torque')}
           label={text('over_angle')}
-          dark={dark}
         />
       )}
       {result.compensation_percent.length > 0 && (
@@ -145,36 +81,9 @@ export function FrictionMap({ result, text }: { result: FrictionResult; text: Te
           {text('save_table')}
         </Button>
       )}
-      <div className="scroll-table">
-        <table className="reported-values" aria-label={text('title')}>
-          <thead>
-            <tr>
-              <th>{t('inertia.quantity')}</th>
-              <th className="right">{t('inertia.value')}</th>
-            </tr>
-          </thead>
-          <tbody className="num">
-            {rowsOf(result, text).map((row) => (
-              <tr key={row.name}>
-                <td>{row.name}</td>
-                <td className="right">
-                  {amount(row.value, row.value === null ? '' : row.unit)}
-                  <small className="dim interval">{interval(row.ends)}</small>
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ValuesTable rows={rowsOf(result, text)} label={text('title')} />
     </>
   )
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  ends: [number | null, number | null] | null
-  unit: string
 }
 
 /** In Nm where the rated torque is known, else in % of it; a dash is what cannot be known. */
@@ -185,7 +94,7 @@ export function rowsOf(result: FrictionResult, text: Text): ShownRow[] {
     rated === null ? [1, '%/rpm'] : [(rated / 100) * RPM_PER_RAD_S, 'N·m·s/rad']
   const row = (
     name: string,
-    found: { value: number; ci95: [number | null, number | null] } | null | undefined,
+    found: { value: number; ci95: NonNullable<Ends> } | null | undefined,
     factor: number,
     shown: string,
   ): ShownRow => ({
@@ -212,10 +121,7 @@ export function rowsOf(result: FrictionResult, text: Text): ShownRow[] {
   ]
 }
 
-const scaled = (
-  ends: [number | null, number | null],
-  factor: number,
-): [number | null, number | null] => [
-  ends[0] === null ? null : factor * ends[0],
-  ends[1] === null ? null : factor * ends[1],
+const scaled = ([low, high]: NonNullable<Ends>, factor: number): Ends => [
+  low === null ? null : factor * low,
+  high === null ? null : factor * high,
 ]

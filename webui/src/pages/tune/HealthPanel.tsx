@@ -1,92 +1,54 @@
-import { useEffect, useMemo, useState } from 'react'
-import { api, ask } from '../../api/client'
 import type { AxisHealth, HealthSettings } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
 import { dateTime } from '../../widgets/format'
-import { JobNote, useJobEnd } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
+import { useJobEnd } from '../../widgets/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
-import { useAction } from '../../widgets/useAction'
-import type { Limits } from '../response/limits'
-import { useToolJob } from '../response/useToolJob'
 import { CHECK_ROUNDS, LEAST_ROUNDS } from './health'
 import { HealthPermission } from './HealthPermission'
 import { HealthStations } from './HealthStations'
 import { HealthTrend } from './HealthTrend'
 import { Findings, SignBaseline } from './HealthVerdict'
 import { MotionWarning } from './MotionWarning'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 import { useHealth } from './useHealth'
 
+const INITIAL = { rounds: LEAST_ROUNDS }
+
 /** Measure a baseline, sign it, repeat it with one press, and what has changed since. */
-export function HealthPanel({
-  drive,
-  limits,
-  obstacle,
-  cycleMs,
-}: {
-  drive: string
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
+export function HealthPanel(measured: Measured) {
+  const { drive, limits, obstacle } = measured
   const t = useT()
-  const { tool, text } = useTool('health')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
-  useEffect(() => setValues({ ...initialValues(fields), rounds: LEAST_ROUNDS }), [fields])
+  const run = useToolRun('health', drive, { initial: INITIAL })
   const { health, problem, refresh, setHealth } = useHealth(drive)
-  const { job, note, dismiss } = useToolJob(drive, 'health')
-  useJobEnd(job?.id ?? null, () => void refresh())
-  const start = useAction()
-  if (!tool) return null
-  const go = (body: HealthSettings) =>
-    start.run(async () => {
-      const params = { path: { drive_id: drive } }
-      setJob(await ask(api.POST('/api/v1/drives/{drive_id}/jobs/health', { params, body })))
-    })
-  const measure = () =>
-    limits && void go({ ...limits, cycle_ms: cycleMs, ...values } as HealthSettings)
+  useJobEnd(run.job?.id ?? null, () => void refresh())
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
+    <ToolPanel
+      run={run}
+      answer={
+        <>
+          <ProblemNote problem={problem} />
+          {health && <Findings health={health} />}
+          {health && <SignBaseline drive={drive} health={health} onSigned={setHealth} />}
+          {health && health.runs.length > 0 && <HealthTrend runs={health.runs} />}
+          {health?.baseline && <HealthPermission drive={drive} job={run.job} />}
+          <HealthStations />
+        </>
+      }
+    >
       {health?.baseline && (
         <Repeat
           health={health}
           obstacle={obstacle}
-          busy={start.busy}
-          onStart={(body) => void go({ ...body, consent: limits?.consent ?? false })}
+          busy={run.start.busy}
+          onStart={(settings) => run.begin({ ...settings, consent: limits?.consent ?? false })}
         />
       )}
       <details open={health !== null && !health.baseline}>
         <summary>{t('health.measure')}</summary>
-        <ToolForm
-          tool={tool}
-          limits={limits}
-          fields={fields}
-          values={values}
-          text={text}
-          onChange={setValues}
-        />
-        <StartButton
-          obstacle={obstacle ?? (complete(fields, values) ? null : t('start.incomplete'))}
-          busy={start.busy}
-          onStart={measure}
-        >
-          {text('start')}
-        </StartButton>
+        <MeasuredStart run={run} measured={measured} />
       </details>
-      <ProblemNote problem={start.problem ?? problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {health && <Findings health={health} />}
-      {health && <SignBaseline drive={drive} health={health} onSigned={setHealth} />}
-      {health && health.runs.length > 0 && <HealthTrend runs={health.runs} />}
-      {health?.baseline && <HealthPermission drive={drive} job={job} />}
-      <HealthStations />
-    </Panel>
+    </ToolPanel>
   )
 }
 

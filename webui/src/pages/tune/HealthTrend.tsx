@@ -1,9 +1,10 @@
-import { NativeSelect, useComputedColorScheme } from '@mantine/core'
+import { NativeSelect } from '@mantine/core'
 import { useMemo, useState } from 'react'
 import type { HealthRunInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { CurvesPlot } from '../../plots/CurvesPlot'
 import { dateTime, figure } from '../../widgets/format'
+import { useCurveColors } from './Answer'
 import { type Series, seriesOf } from './health'
 
 const UNITS: Record<Series['quantity'], string> = {
@@ -20,7 +21,7 @@ const SHOWN = 50
 /** One quantity over the dates, as a plot and a table. */
 export function HealthTrend({ runs }: { runs: HealthRunInfo[] }) {
   const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
+  const [color] = useCurveColors()
   const series = useMemo(() => seriesOf(runs), [runs])
   const [chosen, setChosen] = useState('')
   const one = series.find((each) => each.name === chosen) ?? series[0]
@@ -30,7 +31,7 @@ export function HealthTrend({ runs }: { runs: HealthRunInfo[] }) {
         ? [
             {
               label: one.name,
-              color: dark ? '#6db3f2' : '#1a5c94',
+              color,
               points: true,
               x: one.time,
               y: one.value,
@@ -39,7 +40,7 @@ export function HealthTrend({ runs }: { runs: HealthRunInfo[] }) {
             },
           ]
         : [],
-    [one, dark],
+    [one, color],
   )
   if (!one) return null
   const nameOf = (each: Series) =>
@@ -60,7 +61,6 @@ export function HealthTrend({ runs }: { runs: HealthRunInfo[] }) {
         xLabel={t('health.date')}
         yLabel={quantity}
         label={t('health.over', { name: nameOf(one) })}
-        dark={dark}
         dates
       />
       <div className="scroll-table">

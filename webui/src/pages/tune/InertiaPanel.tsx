@@ -10,12 +10,12 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { fixed } from '../response/bode'
-import type { Limits } from '../response/limits'
 import { asInertia, type Inertia } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
+import { ValuesTable } from './Answer'
 import { MotionWarning } from './MotionWarning'
 import { SchemeFields, useScheme } from './schemes'
-import { amount, interval } from './steps'
+import type { Measured } from './ToolPanel'
 
 const MOVES = {
   free: 'tool.moves',
@@ -30,14 +30,7 @@ export function InertiaPanel({
   limits,
   obstacle,
   cycleMs,
-}: {
-  drive: string
-  state: AxisState | null
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
+}: Measured & { state: AxisState | null }) {
   const t = useT()
   const scheme = useScheme()
   const [repetitions, setRepetitions] = useState<number | null>(4)
@@ -167,31 +160,15 @@ export function InertiaResult({ result }: { result: Inertia }) {
         <strong>{t(result.identifiable ? 'inertia.sure' : 'inertia.unsure')}</strong>{' '}
         {reasons.join('\n')}
       </p>
-      <div className="scroll-table">
-        <table className="reported-values" aria-label={t('inertia.title')}>
-          <thead>
-            <tr>
-              <th>{t('inertia.quantity')}</th>
-              <th className="right">{t('inertia.value')}</th>
-            </tr>
-          </thead>
-          <tbody className="num">
-            {rows.map(({ name, text, unit }) => (
-              <tr key={name}>
-                <td>{t(text)}</td>
-                <td className="right">
-                  {amount(result[name] ?? null, si ? unit : '')}
-                  <small className="dim interval">
-                    {interval(
-                      name in result.ci95 ? result.ci95[name as keyof Inertia['ci95']] : null,
-                    )}
-                  </small>
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ValuesTable
+        label={t('inertia.title')}
+        rows={rows.map(({ name, text, unit }) => ({
+          name: t(text),
+          value: result[name] ?? null,
+          unit: si ? unit : '',
+          ends: name in result.ci95 ? result.ci95[name as keyof Inertia['ci95']] : null,
+        }))}
+      />
       <p className="dim">
         {!si && `${t('inertia.perRated')} `}
         {t('inertia.fit', { r2: fixed(result.r2, 4) })}

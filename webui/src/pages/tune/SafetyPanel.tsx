@@ -1,78 +1,44 @@
-import { Button, NativeSelect, TextInput, useComputedColorScheme } from '@mantine/core'
+import { Button, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useMemo, useState } from 'react'
 import { api, ask } from '../../api/client'
-import { asSafetyCheck } from '../../api/results'
-import type { SafetyResult, SafetySettings } from '../../api/schema'
+import { resultOf } from '../../api/results'
+import type { SafetyResult } from '../../api/schema'
 import { useT } from '../../i18n'
-import { setJob } from '../../live/store'
 import { CurvesPlot } from '../../plots/CurvesPlot'
-import { JobNote } from '../../widgets/JobNote'
-import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
-import type { Limits } from '../response/limits'
-import { useToolJob } from '../response/useToolJob'
+import { Notes, useCurveColors, ValuesTable } from './Answer'
 import { notesOf, rowsOf } from './safety'
-import { amount } from './steps'
-import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
-
-type Text = (name: string, values?: Record<string, string>) => string
+import type { Text } from './shown'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
 const FUNCTIONS = ['sto', 'ss1', 'limit_positive', 'limit_negative', 'speed_limit'] as const
 /** What a person states about one check; asked again for the next. */
 const STATED = ['nothing_hangs', 'load_supported'] as const
 
 /** A safety function that a person triggers by hand, recorded and signed; it certifies nothing. */
-export function SafetyPanel({
-  drive,
-  limits,
-  obstacle,
-  cycleMs,
-}: {
-  drive: string
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
-}) {
-  const t = useT()
-  const { tool, text } = useTool('safety-check')
-  const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
-  const [values, setValues] = useState<Values>({})
+export function SafetyPanel(measured: Measured) {
+  const run = useToolRun('safety-check', measured.drive, { stated: STATED })
+  const { text, values, job } = run
   const [which, setWhich] = useState<(typeof FUNCTIONS)[number]>('sto')
   const [device, setDevice] = useState('')
   const [person, setPerson] = useState(() => localStorage.getItem('servodeck.report.person') ?? '')
   const [signed, setSigned] = useState<SafetyResult | null>(null)
-  const { job, note, dismiss } = useToolJob(drive, 'safety-check')
-  const begun = job?.id ?? ''
-  useEffect(() => setValues(initialValues(fields)), [fields, drive])
-  useEffect(() => {
-    setValues((old) => ({ ...old, ...Object.fromEntries(STATED.map((n) => [n, false])) }))
-    setSigned(null)
-  }, [begun])
-  const start = useAction()
-  const result = signed ?? asSafetyCheck(job?.result)
-  if (!tool) return null
+  useEffect(() => setSigned(null), [job?.id])
+  const result = signed ?? resultOf('safety-check', job?.result)
   const stated = values.nothing_hangs === true || values.load_supported === true
-  const go = () =>
-    start.run(async () => {
-      if (!limits) return
-      const own = { function: which, device, person }
-      const body = { ...limits, cycle_ms: cycleMs, ...values, ...own } as SafetySettings
-      const params = { path: { drive_id: drive } }
-      setJob(await ask(api.POST('/api/v1/drives/{drive_id}/jobs/safety-check', { params, body })))
-    })
-  const missing = !complete(fields, values)
-    ? t('start.incomplete')
-    : !device.trim()
-      ? text('name_first')
-      : stated
-        ? null
-        : text('state_first')
   return (
-    <Panel title={text('title')}>
-      <p className="dim">{text('lead')}</p>
+    <ToolPanel
+      run={run}
+      answer={
+        result && (
+          <>
+            <SafetyAnswer result={result} text={text} />
+            {!result.signature && <Sign result={result} text={text} onSigned={setSigned} />}
+          </>
+        )
+      }
+    >
       <p className="note warn">{text('no_certificate')}</p>
       <p className="note warn">{text('danger')}</p>
       <p className="note warn">{text('warning')}</p>
@@ -96,30 +62,20 @@ export function SafetyPanel({
           onChange={(event) => setPerson(event.currentTarget.value)}
         />
       </div>
-      <ToolForm
-        tool={tool}
-        limits={limits}
-        fields={fields}
-        values={values}
-        text={text}
-        onChange={setValues}
+      <MeasuredStart
+        run={run}
+        measured={measured}
+        asked={{ function: which, device, person }}
+        missing={!device.trim() ? text('name_first') : stated ? null : text('state_first')}
       />
-      <StartButton obstacle={obstacle ?? missing} busy={start.busy} onStart={() => void go()}>
-        {text('start')}
-      </StartButton>
-      <ProblemNote problem={start.problem} onClose={start.clear} />
-      <JobNote id={note} onClose={dismiss} />
-      {result && <SafetyAnswer result={result} text={text} />}
-      {result && !result.signature && <Sign result={result} text={text} onSigned={setSigned} />}
-    </Panel>
+    </ToolPanel>
   )
 }
 
 /** Verdict, values, and speed and torque from the first sign on. */
 function SafetyAnswer({ result, text }: { result: SafetyResult; text: Text }) {
   const t = useT()
-  const dark = useComputedColorScheme('light') === 'dark'
-  const [first, second] = dark ? ['#6db3f2', '#f0a060'] : ['#1a5c94', '#c2571a']
+  const [first, second] = useCurveColors()
   const x = result.trace_ms ?? []
   const curves = useMemo(
     () => [
@@ -134,11 +90,7 @@ function SafetyAnswer({ result, text }: { result: SafetyResult; text: Text }) {
   )
   return (
     <>
-      {notesOf(result, text).map((each) => (
-        <p key={each.words} className={`note ${each.tone}`}>
-          {each.words}
-        </p>
-      ))}
+      <Notes notes={notesOf(result, text)} />
       {x.length > 0 && (
         <>
           <CurvesPlot
@@ -146,37 +98,20 @@ function SafetyAnswer({ result, text }: { result: SafetyResult; text: Text }) {
             xLabel={text('chart_ms')}
             yLabel={text('chart_rpm')}
             label={text('chart')}
-            dark={dark}
           />
           <CurvesPlot
             curves={torque}
             xLabel={text('chart_ms')}
             yLabel={text('chart_percent')}
             label={text('chart_torque')}
-            dark={dark}
           />
         </>
       )}
-      <div className="scroll-table">
-        <table className="reported-values" aria-label={text('title')}>
-          <thead>
-            <tr>
-              <th>{t('inertia.quantity')}</th>
-              <th className="right">{t('inertia.value')}</th>
-            </tr>
-          </thead>
-          <tbody className="num">
-            {rowsOf(result, text).map((row) => (
-              <tr key={row.name}>
-                <td>{row.name}</td>
-                <td className="right">
-                  {row.value === null ? t('safety.notShown') : amount(row.value, row.unit)}
-                </td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ValuesTable
+        rows={rowsOf(result, text)}
+        label={text('title')}
+        unknown={t('safety.notShown')}
+      />
     </>
   )
 }
@@ -200,7 +135,7 @@ function Sign({
       const params = { path: { name } }
       const body = { person, notes }
       const answer = api.POST('/api/v1/measurements/{name}/signature', { params, body })
-      const made = asSafetyCheck(await ask(answer))
+      const made = resultOf('safety-check', await ask(answer))
       if (made) onSigned(made)
     })
   return (

@@ -1,6 +1,7 @@
 import { NativeSelect, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
+import { resultOf } from '../../api/results'
 import type { MeasurementInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob } from '../../live/store'
@@ -11,11 +12,11 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
-import type { Limits } from '../response/limits'
-import { asStep, filesOf } from '../response/results'
+import { filesOf } from '../response/results'
 import { useMeasurement } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { StepNumbers } from './StepNumbers'
+import type { Measured } from './ToolPanel'
 
 /** A step of speed or a move, as a check of what the gains do. */
 export function StepPanel({
@@ -24,12 +25,7 @@ export function StepPanel({
   obstacle,
   cycleMs,
   stored,
-}: {
-  drive: string
-  limits: Limits | null
-  /** What is in the way of a measurement, as text. */
-  obstacle: string | null
-  cycleMs: number
+}: Measured & {
   /** Earlier steps of this axis, newest first. */
   stored: MeasurementInfo[]
 }) {
@@ -51,8 +47,8 @@ export function StepPanel({
   })
   const now = useMeasurement(shown || null)
   const before = useMeasurement(over || null)
-  const result = asStep(now.content?.result)
-  const earlier = asStep(before.content?.result)
+  const result = resultOf('step', now.content?.result)
+  const earlier = resultOf('step', before.content?.result)
   const names = stored.map((each) => ({
     value: each.file,
     label: `${each.drive} · ${dateTime(each.saved)}`,

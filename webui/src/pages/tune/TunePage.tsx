@@ -1,8 +1,8 @@
 import { href } from '../../app/router'
 import { useSay, useT } from '../../i18n'
-import type { DriveSummary, JobInfo } from '../../api/schema'
+import type { DriveSummary } from '../../api/schema'
 import { useAxisState, useDrive, useLink } from '../../live/store'
-import { useJobEnd } from '../../widgets/JobNote'
+import { useJobEnd, useJobEnds } from '../../widgets/JobNote'
 import { Panel } from '../../widgets/Panel'
 import { useBuses } from '../../live/buses'
 import { useLimits } from '../response/limits'
@@ -12,7 +12,7 @@ import { asAutotune, asInertia } from '../response/results'
 import { useChanges } from '../response/undo'
 import { useGains } from '../response/useGains'
 import { useMeasurements } from '../response/useMeasurements'
-import { useToolJob } from '../response/useToolJob'
+import { useNewestJobs } from '../response/useToolJob'
 import { AutotunePanel } from './AutotunePanel'
 import { CandidatesPanel } from './CandidatesPanel'
 import { CyclePanel } from './CyclePanel'
@@ -43,7 +43,23 @@ export function TunePage({ drive }: { drive: string }) {
   return summary && <TunePath key={drive} drive={drive} summary={summary} />
 }
 
-const running = (job: JobInfo | null) => job?.state === 'running'
+/** Where the panel of a tool stands, by the kind of its jobs. */
+const SECTIONS: Record<string, Section> = {
+  autotune: 'automatic',
+  inertia: 'inertia',
+  step: 'verify',
+  'first-power': 'first',
+  cycle: 'more',
+  shaping: 'more',
+  vibration: 'more',
+  dwell: 'more',
+  friction: 'more',
+  'load-side': 'more',
+  gantry: 'more',
+  'brake-test': 'more',
+  health: 'more',
+  'safety-check': 'more',
+}
 
 function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) {
   const t = useT()
@@ -57,35 +73,11 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   const measured = useMeasurements('')
   const reports = useReports()
   const changes = useChanges(drive)
-  const inertiaJob = useToolJob(drive, 'inertia').job
-  const tuneJob = useToolJob(drive, 'autotune').job
-  const stepJob = useToolJob(drive, 'step').job
-  const frictionJob = useToolJob(drive, 'friction').job
-  const loadSideJob = useToolJob(drive, 'load-side').job
-  const gantryJob = useToolJob(drive, 'gantry').job
-  const brakeJob = useToolJob(drive, 'brake-test').job
-  const firstJob = useToolJob(drive, 'first-power').job
-  const healthJob = useToolJob(drive, 'health').job
-  const safetyJob = useToolJob(drive, 'safety-check').job
-  const shapingJob = useToolJob(drive, 'shaping').job
-  const vibrationJob = useToolJob(drive, 'vibration').job
-  const dwellJob = useToolJob(drive, 'dwell').job
-  const cycleJob = useToolJob(drive, 'cycle').job
-  useJobEnd(inertiaJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(frictionJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(loadSideJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(gantryJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(brakeJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(firstJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(cycleJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(shapingJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(vibrationJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(dwellJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(stepJob?.id ?? null, () => void measured.refresh())
-  useJobEnd(tuneJob?.id ?? null, () => {
-    void measured.refresh()
-    void gains.read()
-  })
+  const jobs = useNewestJobs(drive)
+  const job = (kind: string) => jobs.get(kind) ?? null
+  const tuneJob = job('autotune')
+  useJobEnds(jobs, () => void measured.refresh())
+  useJobEnd(tuneJob?.id ?? null, () => void gains.read())
   const tuned = asAutotune(tuneJob?.result)
   const bus =
     buses.find(
@@ -104,7 +96,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
         : limits.agreed
           ? null
           : t('start.agree')
-  const found = asInertia(inertiaJob?.result) ?? tuned?.inertia ?? null
+  const found = asInertia(job('inertia')?.result) ?? tuned?.inertia ?? null
   const si = found?.identifiable && found.unit === 'SI' ? found.inertia_kgm2 : null
   const designable = gains.gains !== null && gains.gains.convention !== 'unit'
   const ours = measured.list.filter(
@@ -122,27 +114,12 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
   }
   const done = stepsDone(path)
   const next = nextStep(done)
-  const busy: [JobInfo | null, Section][] = [
-    [tuneJob, 'automatic'],
-    [inertiaJob, 'inertia'],
-    [stepJob, 'verify'],
-    [firstJob, 'first'],
-    [frictionJob, 'more'],
-    [loadSideJob, 'more'],
-    [gantryJob, 'more'],
-    [brakeJob, 'more'],
-    [healthJob, 'more'],
-    [safetyJob, 'more'],
-    [cycleJob, 'more'],
-    [shapingJob, 'more'],
-    [vibrationJob, 'more'],
-    [dwellJob, 'more'],
-  ]
   const now: Section[] = possible
     ? present(done, {
         automatic: designable,
         tuned: tuned?.applied != null,
-        running: busy.find(([job]) => running(job))?.[1] ?? null,
+        running:
+          Object.entries(SECTIONS).find(([kind]) => job(kind)?.state === 'running')?.[1] ?? null,
       })
     : ['checks', 'manual', 'gains']
   const of = useSections(now)

@@ -1,19 +1,6 @@
 import type { CycleResult } from '../../api/schema'
+import type { ShownNote, ShownRow, Text } from './shown'
 import { engineering } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-  ends: [number | null, number | null] | null
-}
 
 /** What somebody should do something about. */
 const WARNS: ReadonlySet<string> = new Set([

@@ -1,20 +1,6 @@
 import type { AxisState, DriveSummary, GantryResult, GantryValue } from '../../api/schema'
+import type { ShownNote, ShownRow, Text } from './shown'
 import { type Check, engineering, preChecks } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-type Ends = [number | null, number | null] | null
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'fault' | 'info'
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-  ends: Ends
-}
 
 interface ShownCurve {
   label: string

@@ -1,20 +1,6 @@
 import type { LoadSideResult } from '../../api/schema'
+import type { Ends, ShownNote, ShownRow, Text } from './shown'
 import { engineering } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-type Ends = [number | null, number | null] | null
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-  ends: Ends
-}
 
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
   measured: 'good',

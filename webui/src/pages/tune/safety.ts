@@ -1,12 +1,6 @@
 import type { SafetyResult } from '../../api/schema'
+import type { ShownNote, ShownRow, Text } from './shown'
 import { engineering } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
-}
 
 /** The verdict first, as `backend/tools/safety_check/texts.py` has it; always that it is no certificate. */
 export function notesOf(result: SafetyResult, text: Text): ShownNote[] {
@@ -50,12 +44,6 @@ export function notesOf(result: SafetyResult, text: Text): ShownNote[] {
 }
 
 const moment = (iso: string) => iso.slice(0, 19).replace('T', ' ')
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-}
 
 /** What was recorded; null is what could not be shown. */
 export function rowsOf(result: SafetyResult, text: Text): ShownRow[] {

@@ -1,19 +1,6 @@
 import type { ShapingResult } from '../../api/schema'
+import type { ShownNote, ShownRow, ShownTable, Text } from './shown'
 import { engineering } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-  ends: [number | null, number | null] | null
-}
 
 const TONES = {
   verified: 'good',
@@ -90,12 +77,6 @@ export function shapingRows(result: ShapingResult, text: Text): ShownRow[] {
         ]
       : []),
   ]
-}
-
-interface ShownTable {
-  name: string
-  head: string[]
-  rows: string[][]
 }
 
 /**

@@ -1,26 +1,6 @@
 import type { DwellResult, VibrationResult } from '../../api/schema'
+import type { Ends, ShownNote, ShownRow, ShownTable, Text } from './shown'
 import { engineering } from './steps'
-
-type Text = (name: string, values?: Record<string, string>) => string
-type Ends = [number | null, number | null] | null
-
-interface ShownNote {
-  words: string
-  tone: 'good' | 'warn' | 'info'
-}
-
-interface ShownRow {
-  name: string
-  value: number | null
-  unit: string
-  ends: Ends
-}
-
-interface ShownTable {
-  name: string
-  head: string[]
-  rows: string[][]
-}
 
 /** As `backend/tools/vibration/texts.py` and `backend/tools/dwell/texts.py` have them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
