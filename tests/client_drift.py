@@ -17,8 +17,6 @@ from pathlib import Path
 from pydantic.json_schema import models_json_schema
 
 from backend.api.app import make_app
-from backend.api.live import messages as live_messages
-from backend.api.live import people_messages as live_people_messages
 from backend.api.station import models as models_bench
 from backend.api.station import models_description, models_doctor
 from backend.station.bench import Bench
@@ -29,20 +27,12 @@ CLIENT = ROOT / "webui" / "src" / "api" / "schema.d.ts"
 
 
 def description() -> str:
-    """OpenAPI document, with the websocket's messages among its schemas."""
+    """OpenAPI document, with the models that the results of jobs carry among its schemas."""
     with tempfile.TemporaryDirectory() as folder:
         app = make_app(Bench(Path(folder)), hosts=frozenset())
         document = app.openapi()
-    messages = [
-        (model, "serialization")
-        for module in (live_messages, live_people_messages)
-        for model in vars(module).values()
-        if isinstance(model, type)
-        and issubclass(model, live_messages.Message)
-        and model.__module__ == module.__name__
-    ]
     # Carried in the results of jobs, so no route names them.
-    messages += [
+    results = [
         (model, "serialization")
         for model in (
             models_bench.FoundDrive,
@@ -51,7 +41,7 @@ def description() -> str:
             models_doctor.TrialResult,
         )
     ]
-    _, extra = models_json_schema(messages, ref_template="#/components/schemas/{model}")
+    _, extra = models_json_schema(results, ref_template="#/components/schemas/{model}")
     schemas = document["components"]["schemas"]
     schemas.update({k: v for k, v in extra["$defs"].items() if k not in schemas})
     document["info"]["version"] = "1"

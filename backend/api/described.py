@@ -6,7 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from fastapi import FastAPI
+from pydantic import TypeAdapter
+from pydantic.json_schema import JsonSchemaMode
 
+from backend.api.live.messages import FromPage, ToPage
 from backend.api.models import Problem
 
 _PLAIN, _PROBLEM = "application/json", "application/problem+json"
@@ -38,7 +41,9 @@ class DescribedApp(FastAPI):
             for operations in document["paths"].values():
                 for operation in operations.values():
                     _correct(operation["responses"])
-            _describe_problem(document["components"]["schemas"])
+            schemas = document["components"]["schemas"]
+            _describe_problem(schemas)
+            _describe_messages(schemas)
         return super().openapi()
 
 
@@ -52,6 +57,19 @@ def _describe_problem(schemas: dict[str, Any]) -> None:
     merged = {**parts, **schemas, Problem.__name__: made}
     schemas.clear()
     schemas.update(sorted(merged.items()))
+
+
+def _describe_messages(schemas: dict[str, Any]) -> None:
+    """Add the messages of the live connection, which no route names: ``FromPage``, ``ToPage``."""
+    adapters: tuple[tuple[str, TypeAdapter[Any], JsonSchemaMode], ...] = (
+        ("FromPage", TypeAdapter(FromPage), "validation"),
+        ("ToPage", TypeAdapter(ToPage), "serialization"),
+    )
+    for name, adapter, mode in adapters:
+        made = adapter.json_schema(ref_template=_SCHEMAS, mode=mode)
+        parts = made.pop("$defs")
+        schemas.update({each: part for each, part in parts.items() if each not in schemas})
+        schemas[name] = made
 
 
 def _correct(responses: dict[str, Any]) -> None:

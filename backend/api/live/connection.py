@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from functools import partial
 
 from fastapi import WebSocket, WebSocketDisconnect
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 from starlette.websockets import WebSocketState
 
 import backend
@@ -37,6 +37,7 @@ from backend.api.live.messages import (
     StopAll,
     StopReached,
     StopTaken,
+    ToPage,
     WatchState,
     WatchValues,
     from_page,
@@ -136,7 +137,7 @@ class Connection:
 
     # --- out --------------------------------------------------------------------------
 
-    def send(self, message: BaseModel | Shared) -> None:
+    def send(self, message: ToPage | Shared) -> None:
         """Queue a message that must not be lost; a page that never reads is disconnected."""
         try:
             self._queue.put_nowait(message if isinstance(message, Shared) else only(message))

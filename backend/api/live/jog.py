@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydantic import BaseModel
-
 from backend.api.drive.convert_motion import jog_settings, unit_of
 from backend.api.errors import message_or_none, problem_of, words_of
-from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart
+from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart, ToPage
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import jog_cyclic
@@ -23,7 +21,7 @@ from drivers.texts.message import Text, text
 class Jogs:
     """Jogs of one live connection. ``send`` queues a message for its page."""
 
-    def __init__(self, bench: Bench, connection: str, send: Callable[[BaseModel], None]) -> None:
+    def __init__(self, bench: Bench, connection: str, send: Callable[[ToPage], None]) -> None:
         self._bench, self._connection, self._send = bench, connection, send
         self._holds: dict[str, Hold] = {}
 

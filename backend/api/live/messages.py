@@ -23,7 +23,7 @@ from pydantic import Field, TypeAdapter
 
 from backend.api.drive.models_axis import AxisState, StopResult
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.live.people_messages import PeopleRequest
+from backend.api.live.people_messages import PeopleNews, PeopleRequest
 from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
 from backend.api.station.models import DriveSummary
 from backend.tools.jog.release import ReleaseOfPage
@@ -290,3 +290,21 @@ class Pong(Message):
 
     type: Literal["pong"] = "pong"
     n: int
+
+
+DriveNews = (
+    Hello
+    | StateChanged
+    | DrivesChanged
+    | ValuesChanged
+    | JobChanged
+    | JogEnded
+    | JogGap
+    | ScopeInfo
+    | Logged
+    | Refused
+    | StopTaken
+    | StopReached
+    | Pong
+)
+ToPage = Annotated[DriveNews | PeopleNews, Field(discriminator="type")]

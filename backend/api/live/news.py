@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel
-
 from backend.api import convert
-from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ValuesChanged
+from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ToPage, ValuesChanged
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
 from backend.work.jobs import Job
 
 
-def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
+def state(bench: Bench, drive: str, snapshot: Snapshot) -> ToPage | None:
     """State of an axis; None if its drive has left the bench."""
     connected = bench.connected_drives.get(drive)
     if connected is None:
@@ -19,7 +17,7 @@ def state(bench: Bench, drive: str, snapshot: Snapshot) -> BaseModel | None:
     return StateChanged(state=convert.axis_state(bench, connected, snapshot))
 
 
-def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
+def values(bench: Bench, drive: str, keys: frozenset[str]) -> ToPage | None:
     """Last readings of these parameters; None if the drive has left the bench."""
     connected = bench.connected_drives.get(drive)
     if connected is None or not keys:
@@ -28,7 +26,7 @@ def values(bench: Bench, drive: str, keys: frozenset[str]) -> BaseModel | None:
     return ValuesChanged.model_construct(drive=drive, values=rows)
 
 
-def drive_list(bench: Bench, connection: str | None) -> BaseModel:
+def drive_list(bench: Bench, connection: str | None) -> ToPage:
     """The drives as seen from this connection; without one, as seen without control."""
     connected_drives = bench.connected_drives.values()
     return DrivesChanged(
@@ -36,6 +34,6 @@ def drive_list(bench: Bench, connection: str | None) -> BaseModel:
     )
 
 
-def job_state(job: Job) -> BaseModel:
+def job_state(job: Job) -> ToPage:
     """Current state of a job."""
     return JobChanged(job=convert.job(job))

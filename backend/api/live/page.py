@@ -5,8 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Protocol
 
-from pydantic import BaseModel
-
+from backend.api.live.messages import ToPage
 from backend.api.live.shared import Shared
 from backend.people.identity import Identity
 from drivers.texts.message import Text
@@ -22,7 +21,7 @@ class Page(Protocol):
     #: Monotonic time of the last message; infinite while a message is being carried out.
     heard: float
 
-    def send(self, message: BaseModel | Shared) -> None:
+    def send(self, message: ToPage | Shared) -> None:
         """Queue a message that must not be lost."""
 
     def later(self, kind: str, which: str, message: Shared) -> None:

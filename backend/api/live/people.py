@@ -6,9 +6,8 @@ import contextlib
 from collections.abc import Mapping
 from functools import partial
 
-from pydantic import BaseModel
-
 from backend.api.live.control import PeopleControl
+from backend.api.live.messages import ToPage
 from backend.api.live.page import Page
 from backend.api.live.people_messages import (
     Chat,
@@ -129,7 +128,7 @@ class PeopleLive:
                 )
                 self._to_others(page, f"cursor {request.plot}", cursor)
 
-    def _to_others(self, page: Page, kind: str, message: BaseModel) -> None:
+    def _to_others(self, page: Page, kind: str, message: ToPage) -> None:
         """Send to all other pages; pointers coalesce, as only the newest position matters."""
         shared = only(message)
         for other in list(self._pages.values()):

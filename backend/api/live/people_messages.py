@@ -222,3 +222,6 @@ class ChatLine(Message):
     person: str
     guest: bool
     text: str
+
+
+PeopleNews = PeopleHere | LeaseNotice | PointerMoved | CursorMoved | ChatLine

@@ -13,10 +13,9 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from fastapi import WebSocketDisconnect
-from pydantic import BaseModel
 
 from backend.api.errors import problem_of
-from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop
+from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop, ToPage
 from backend.api.live.scope_blocks import encode_block
 from backend.scales.units import AxisUnits
 from backend.scope.hub import Subscription
@@ -52,7 +51,7 @@ class ScopeStreams:
     """All subscriptions of one connection. ``notify`` queues a text message to the page."""
 
     def __init__(
-        self, bench: Bench, name: str, notify: Callable[[BaseModel], None], send: SendBytes
+        self, bench: Bench, name: str, notify: Callable[[ToPage], None], send: SendBytes
     ) -> None:
         self._bench = bench
         self._name = name

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pydantic import BaseModel
+from backend.api.live.messages import ToPage
 
 
 class Shared:
@@ -13,8 +13,8 @@ class Shared:
     ``make`` may return None if there is nothing to report any more.
     """
 
-    def __init__(self, make: Callable[[], BaseModel | None]) -> None:
-        self._make: Callable[[], BaseModel | None] | None = make
+    def __init__(self, make: Callable[[], ToPage | None]) -> None:
+        self._make: Callable[[], ToPage | None] | None = make
         self._text: str | None = None
 
     @property
@@ -26,6 +26,6 @@ class Shared:
         return self._text
 
 
-def only(message: BaseModel) -> Shared:
+def only(message: ToPage) -> Shared:
     """Wrap a message that is made already."""
     return Shared(lambda: message)

@@ -4744,9 +4744,8 @@ export interface components {
             /** Text */
             text: string;
             /**
-             * Type
-             * @default chat
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "chat";
         };
@@ -4769,9 +4768,8 @@ export interface components {
              */
             time: string;
             /**
-             * Type
-             * @default chat_said
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "chat_said";
         };
@@ -4851,9 +4849,8 @@ export interface components {
              */
             plot: "scope" | "spectrum" | "response" | "prediction" | "step" | "predicted_step" | "excitation";
             /**
-             * Type
-             * @default cursor_moved
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "cursor_moved";
             /** X */
@@ -5487,9 +5484,8 @@ export interface components {
             /** Drives */
             drives: components["schemas"]["DriveSummary"][];
             /**
-             * Type
-             * @default drives
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "drives";
         };
@@ -5764,9 +5760,8 @@ export interface components {
             /** Invitation */
             invitation: string;
             /**
-             * Type
-             * @default enable_press
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "enable_press";
         };
@@ -5784,9 +5779,8 @@ export interface components {
              */
             reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
-             * Type
-             * @default enable_release
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "enable_release";
         };
@@ -5798,9 +5792,8 @@ export interface components {
             /** Invitation */
             invitation: string;
             /**
-             * Type
-             * @default enable_renew
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "enable_renew";
         };
@@ -6518,6 +6511,7 @@ export interface components {
              */
             travel_limit: number;
         };
+        FromPage: components["schemas"]["WatchState"] | components["schemas"]["WatchValues"] | components["schemas"]["JogStart"] | components["schemas"]["JogRenew"] | components["schemas"]["JogStop"] | components["schemas"]["StopAll"] | components["schemas"]["LeaseTake"] | components["schemas"]["ScopeStart"] | components["schemas"]["ScopeStop"] | components["schemas"]["Ping"] | components["schemas"]["LeaseAsk"] | components["schemas"]["LeaseAnswer"] | components["schemas"]["LeaseHand"] | components["schemas"]["LeaseOverride"] | components["schemas"]["Where"] | components["schemas"]["Pointer"] | components["schemas"]["PlotCursor"] | components["schemas"]["Chat"] | components["schemas"]["EnablePress"] | components["schemas"]["EnableRenew"] | components["schemas"]["EnableRelease"];
         /**
          * Functions
          * @description Everything that a family's pages need beyond its parameters, faults and procedures.
@@ -7874,9 +7868,8 @@ export interface components {
             /** Connection */
             connection: string;
             /**
-             * Type
-             * @default hello
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "hello";
             /** Version */
@@ -8349,9 +8342,8 @@ export interface components {
         JobChanged: {
             job: components["schemas"]["JobInfo"];
             /**
-             * Type
-             * @default job
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "job";
         };
@@ -8436,9 +8428,8 @@ export interface components {
              */
             remedy_message: components["schemas"]["MessageInfo"] | null;
             /**
-             * Type
-             * @default jog_ended
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "jog_ended";
         };
@@ -8460,9 +8451,8 @@ export interface components {
              */
             gap_ms: number;
             /**
-             * Type
-             * @default jog_gap
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "jog_gap";
         };
@@ -8507,9 +8497,8 @@ export interface components {
              */
             silent_ms: number;
             /**
-             * Type
-             * @default jog_renew
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "jog_renew";
         };
@@ -8554,9 +8543,8 @@ export interface components {
              */
             travel_limit: number;
             /**
-             * Type
-             * @default jog_start
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "jog_start";
             /**
@@ -8587,9 +8575,8 @@ export interface components {
              */
             reason: "released" | "pointer-cancelled" | "focus-lost" | "page-hidden" | "page-left" | "page-silent" | "escape" | "another-key" | "another-jog" | "another-guest" | "axis-changed" | "connection-lost" | "stop";
             /**
-             * Type
-             * @default jog_stop
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "jog_stop";
         };
@@ -8661,9 +8648,8 @@ export interface components {
             /** Give */
             give: boolean;
             /**
-             * Type
-             * @default lease_answer
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease_answer";
         };
@@ -8675,9 +8661,8 @@ export interface components {
             /** Drive */
             drive: string;
             /**
-             * Type
-             * @default lease_ask
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease_ask";
         };
@@ -8696,9 +8681,8 @@ export interface components {
             /** To */
             to: string;
             /**
-             * Type
-             * @default lease_hand
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease_hand";
         };
@@ -8717,9 +8701,8 @@ export interface components {
             /** Person */
             person: string;
             /**
-             * Type
-             * @default lease_notice
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease_notice";
         };
@@ -8733,9 +8716,8 @@ export interface components {
             /** Drive */
             drive: string;
             /**
-             * Type
-             * @default lease_override
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease_override";
         };
@@ -8749,9 +8731,8 @@ export interface components {
             /** Take */
             take: boolean;
             /**
-             * Type
-             * @default lease
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "lease";
         };
@@ -9066,9 +9047,8 @@ export interface components {
         Logged: {
             entry: components["schemas"]["LogEntry"];
             /**
-             * Type
-             * @default log
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "log";
         };
@@ -9876,9 +9856,8 @@ export interface components {
             /** Rights */
             rights: components["schemas"]["Right"][];
             /**
-             * Type
-             * @default people
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "people";
         };
@@ -9920,9 +9899,8 @@ export interface components {
             /** N */
             n: number;
             /**
-             * Type
-             * @default ping
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "ping";
         };
@@ -9948,9 +9926,8 @@ export interface components {
              */
             plot: "scope" | "spectrum" | "response" | "prediction" | "step" | "predicted_step" | "excitation";
             /**
-             * Type
-             * @default plot_cursor
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "plot_cursor";
             /** X */
@@ -9967,9 +9944,8 @@ export interface components {
          */
         Pointer: {
             /**
-             * Type
-             * @default pointer
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "pointer";
             /** X */
@@ -9989,9 +9965,8 @@ export interface components {
             /** Person */
             person: string;
             /**
-             * Type
-             * @default pointer_moved
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "pointer_moved";
             /** X */
@@ -10007,9 +9982,8 @@ export interface components {
             /** N */
             n: number;
             /**
-             * Type
-             * @default pong
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "pong";
         };
@@ -10855,9 +10829,8 @@ export interface components {
             /** Request */
             request: string;
             /**
-             * Type
-             * @default refused
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "refused";
         };
@@ -11455,9 +11428,8 @@ export interface components {
             /** Subscription */
             subscription: number;
             /**
-             * Type
-             * @default scope_info
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "scope_info";
         };
@@ -11548,9 +11520,8 @@ export interface components {
             /** Subscription */
             subscription: number;
             /**
-             * Type
-             * @default scope_start
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "scope_start";
         };
@@ -11562,9 +11533,8 @@ export interface components {
             /** Subscription */
             subscription: number;
             /**
-             * Type
-             * @default scope_stop
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "scope_stop";
         };
@@ -12496,9 +12466,8 @@ export interface components {
         StateChanged: {
             state: components["schemas"]["AxisState"];
             /**
-             * Type
-             * @default state
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "state";
         };
@@ -12690,9 +12659,8 @@ export interface components {
              */
             drive: string | null;
             /**
-             * Type
-             * @default stop
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "stop";
         };
@@ -12703,9 +12671,8 @@ export interface components {
         StopReached: {
             result: components["schemas"]["StopResult"];
             /**
-             * Type
-             * @default stop_result
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "stop_result";
         };
@@ -12800,9 +12767,8 @@ export interface components {
                 [key: string]: string;
             };
             /**
-             * Type
-             * @default stop_taken
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "stop_taken";
         };
@@ -13247,6 +13213,7 @@ export interface components {
             /** Unit */
             unit: string;
         };
+        ToPage: components["schemas"]["Hello"] | components["schemas"]["StateChanged"] | components["schemas"]["DrivesChanged"] | components["schemas"]["ValuesChanged"] | components["schemas"]["JobChanged"] | components["schemas"]["JogEnded"] | components["schemas"]["JogGap"] | components["schemas"]["ScopeInfo"] | components["schemas"]["Logged"] | components["schemas"]["Refused"] | components["schemas"]["StopTaken"] | components["schemas"]["StopReached"] | components["schemas"]["Pong"] | components["schemas"]["PeopleHere"] | components["schemas"]["LeaseNotice"] | components["schemas"]["PointerMoved"] | components["schemas"]["CursorMoved"] | components["schemas"]["ChatLine"];
         /**
          * TokenInfo
          * @description A token for scripts.
@@ -13421,9 +13388,8 @@ export interface components {
             /** Drive */
             drive: string;
             /**
-             * Type
-             * @default values
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "values";
             /** Values */
@@ -13769,9 +13735,8 @@ export interface components {
             /** Drives */
             drives: string[];
             /**
-             * Type
-             * @default watch_state
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "watch_state";
         };
@@ -13798,9 +13763,8 @@ export interface components {
              */
             period_s: number;
             /**
-             * Type
-             * @default watch_values
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "watch_values";
         };
@@ -13812,9 +13776,8 @@ export interface components {
             /** Page */
             page: string;
             /**
-             * Type
-             * @default where
-             * @constant
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
              */
             type: "where";
         };
@@ -13991,6 +13954,7 @@ export type FoundDrive = components['schemas']['FoundDrive'];
 export type FrictionPoint = components['schemas']['FrictionPoint'];
 export type FrictionResult = components['schemas']['FrictionResult'];
 export type FrictionSettings = components['schemas']['FrictionSettings'];
+export type FromPage = components['schemas']['FromPage'];
 export type Functions = components['schemas']['Functions'];
 export type GainBlock = components['schemas']['GainBlock'];
 export type GainInfo = components['schemas']['GainInfo'];
@@ -14238,6 +14202,7 @@ export type TerminalFunction = components['schemas']['TerminalFunction'];
 export type TerminalInfo = components['schemas']['TerminalInfo'];
 export type ThreeWay = components['schemas']['ThreeWay'];
 export type ThreeWayRow = components['schemas']['ThreeWayRow'];
+export type ToPage = components['schemas']['ToPage'];
 export type TokenInfo = components['schemas']['TokenInfo'];
 export type ToolInfo = components['schemas']['ToolInfo'];
 export type TouchProbe = components['schemas']['TouchProbe'];

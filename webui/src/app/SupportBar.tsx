@@ -1,10 +1,9 @@
 import { Button } from '@mantine/core'
 import { type PointerEvent, useEffect, useRef, useState } from 'react'
-import type { InvitationView } from '../api/schema'
+import type { InvitationView, JogStop } from '../api/schema'
 import { useT } from '../i18n'
 import * as live from '../live/live'
 import { usePeople } from '../live/people'
-import type { Release } from '../live/protocol'
 import { contents, subscribe, useDrives } from '../live/store'
 import { clock } from '../widgets/format'
 import { Icon } from '../widgets/Icon'
@@ -106,13 +105,13 @@ const BEAT_MS = 30
 function EnablingButton({ invitation }: { invitation: InvitationView }) {
   const t = useT()
   const [held, setHeld] = useState(false)
-  const stop = useRef<((why: Release) => void) | null>(null)
+  const stop = useRef<((why: JogStop['reason']) => void) | null>(null)
   const press = () => {
     if (stop.current || document.visibilityState !== 'visible') return
     live.enablePress(invitation.id)
     setHeld(true)
     const beat = setInterval(() => live.enableBeat(), BEAT_MS)
-    const release = (why: Release) => {
+    const release = (why: JogStop['reason']) => {
       if (stop.current !== release) return
       stop.current = null
       clearInterval(beat)

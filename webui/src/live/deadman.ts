@@ -1,5 +1,4 @@
-import type { JogRenew, JogStart } from '../api/schema'
-import type { Release } from './protocol'
+import type { JogRenew, JogStart, JogStop } from '../api/schema'
 
 /** Time between signs of life sent. */
 export const RENEW_MS = 40
@@ -15,7 +14,7 @@ type Send = (
   message:
     | JogStart
     | (Omit<JogRenew, 'sent_ms' | 'sign'> & { sent_ms: number; sign: number })
-    | { type: 'jog_stop'; drive: string; press: number; reason: Release },
+    | { type: 'jog_stop'; drive: string; press: number; reason: JogStop['reason'] },
 ) => boolean
 
 /**
@@ -70,7 +69,7 @@ export class DeadMan {
     else if (!this.give(this.drive, this.press, true, silent)) this.drive = null
   }
 
-  stop(reason: Release): void {
+  stop(reason: JogStop['reason']): void {
     if (this.drive === null) return
     const drive = this.drive
     this.drive = null

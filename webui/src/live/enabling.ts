@@ -1,4 +1,4 @@
-import type { Release } from './protocol'
+import type { JogStop } from '../api/schema'
 
 /** With the 40 ms between looks the motion ends within 200 ms of the page's last sign of life. */
 export const SILENCE_MS = 140
@@ -6,7 +6,7 @@ export const SILENCE_MS = 140
 type Send = (
   message:
     | { type: 'enable_press' | 'enable_renew'; invitation: string }
-    | { type: 'enable_release'; invitation: string; reason: Release },
+    | { type: 'enable_release'; invitation: string; reason: JogStop['reason'] },
 ) => boolean
 
 /**
@@ -44,7 +44,7 @@ export class EnablingHold {
     }
   }
 
-  release(reason: Release): void {
+  release(reason: JogStop['reason']): void {
     if (this.invitation === null) return
     const invitation = this.invitation
     this.invitation = null

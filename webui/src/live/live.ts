@@ -1,7 +1,6 @@
 import { API_ROOT, api, ask, setConnection } from '../api/client'
-import type { JogStart } from '../api/schema'
+import type { FromPage, JogStart, JogStop, ToPage } from '../api/schema'
 import { addChat, addNotice, setCursor, setPeople, setPointer } from './people'
-import type { FromPage, Release, ToPage } from './protocol'
 import * as store from './store'
 import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker-messages'
 
@@ -29,10 +28,10 @@ export function jogStart(message: JogStart): void {
   post({ kind: 'jogStart', message })
 }
 export const jogBeat = (drive: string) => post({ kind: 'jogBeat', drive })
-export const jogStop = (reason: Release) => post({ kind: 'jogStop', reason })
+export const jogStop = (reason: JogStop['reason']) => post({ kind: 'jogStop', reason })
 export const enablePress = (invitation: string) => post({ kind: 'enablePress', invitation })
 export const enableBeat = () => post({ kind: 'enableBeat' })
-export const enableRelease = (reason: Release) => post({ kind: 'enableRelease', reason })
+export const enableRelease = (reason: JogStop['reason']) => post({ kind: 'enableRelease', reason })
 export const toScope = (message: Extract<ToWorker, { kind: 'scope' | 'scopeClear' | 'trigger' }>) =>
   post(message)
 

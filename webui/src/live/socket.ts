@@ -1,4 +1,4 @@
-import type { FromPage, ToPage } from './protocol'
+import type { FromPage, ToPage } from '../api/schema'
 
 /** What the rest needs of a WebSocket; tests bring their own. */
 export interface SocketLike {

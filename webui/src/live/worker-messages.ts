@@ -1,7 +1,6 @@
-import type { JogStart } from '../api/schema'
+import type { FromPage, JogStart, JogStop, ToPage } from '../api/schema'
 import type { Columns } from './decimate'
 import type { Measurement } from './measure'
-import type { FromPage, Release, ToPage } from './protocol'
 import type { LinkState } from './socket'
 import type { Spectrogram, Spectrum, WindowKind } from './spectrum'
 import type { TriggerSettings } from './trigger'
@@ -117,10 +116,10 @@ export type ToWorker =
   | { kind: 'stand'; name: string; message: FromPage | null }
   | { kind: 'jogStart'; message: JogStart }
   | { kind: 'jogBeat'; drive: string }
-  | { kind: 'jogStop'; reason: Release }
+  | { kind: 'jogStop'; reason: JogStop['reason'] }
   | { kind: 'enablePress'; invitation: string }
   | { kind: 'enableBeat' }
-  | { kind: 'enableRelease'; reason: Release }
+  | { kind: 'enableRelease'; reason: JogStop['reason'] }
   | { kind: 'scope'; config: ScopeConfig }
   | { kind: 'scopeClear' }
   | { kind: 'trigger'; trigger: ScopeTrigger | null }

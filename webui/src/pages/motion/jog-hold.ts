@@ -1,4 +1,4 @@
-import type { Release } from '../../live/protocol'
+import type { JogStop } from '../../api/schema'
 
 /**
  * After so long without a beat the page was too busy to see a release. Only a drawn frame counts
@@ -9,7 +9,7 @@ export const BUSY_MS = 120
 interface Port {
   start(direction: -1 | 1): void
   beat(): void
-  stop(reason: Release): void
+  stop(reason: JogStop['reason']): void
   /** Called with the direction, or null, whenever it changes. */
   changed(direction: -1 | 1 | null): void
 }
@@ -58,7 +58,7 @@ export class JogHold {
     return true
   }
 
-  release(reason: Release): void {
+  release(reason: JogStop['reason']): void {
     if (this.direction === null) return
     this.around.cancelFrame(this.frame)
     this.direction = null
