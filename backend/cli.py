@@ -19,154 +19,157 @@ from backend import __version__
 from drivers.texts.message import Language, language, language_of, speak
 
 COMMANDS = {
-    "serve": ("start:serve", "Start the server and the web page."),
-    "demo": ("start:demo", "Start the server on a bench of virtual drives: no hardware, no root."),
-    "virtual": ("virtual:virtual", "Run one virtual drive on a real wire, for any client."),
-    "scan": ("scan:scan", "Look for drives on a bus."),
-    "bus": ("bus:app", "What goes over the wires of a bus."),
+    "serve": ("server.start:serve", "Start the server and the web page."),
+    "demo": (
+        "server.start:demo",
+        "Start the server on a bench of virtual drives: no hardware, no root.",
+    ),
+    "virtual": ("buses.virtual:virtual", "Run one virtual drive on a real wire, for any client."),
+    "scan": ("buses.scan:scan", "Look for drives on a bus."),
+    "bus": ("buses.bus:app", "What goes over the wires of a bus."),
     "doctor": (
-        "doctor:doctor",
+        "buses.doctor:doctor",
         "Why a drive does not reach Operational. Nothing moves.",
     ),
     "conformance": (
-        "conformance:conformance",
+        "buses.conformance:conformance",
         "Which rules of the public standards a slave keeps. Never enables; nothing moves.",
     ),
     "eeprom": (
-        "eeprom:app",
+        "buses.eeprom:app",
         "The EEPROM of an EtherCAT drive: save, compare, restore, alias, identity.",
     ),
     "lss": (
-        "lss:app",
+        "buses.lss:app",
         "Node number and bit rate of a CANopen node that has none, or by its identity (CiA 305).",
     ),
-    "params": ("params:app", "Read and write parameters on a bus, or by a running server."),
+    "params": ("drive.params:app", "Read and write parameters on a bus, or by a running server."),
     "jog": (
-        "live:jog",
+        "drive.live:jog",
         "Turn an axis for as long as this command runs. It moves; Ctrl+C stops it.",
     ),
     "scope": (
-        "live:scope",
+        "drive.live:scope",
         "Record signals of one drive or several into a CSV file. Nothing moves.",
     ),
     "io": (
-        "functions:io",
+        "drive.functions:io",
         "Show the terminals: state, function, and functions that two of them have.",
     ),
     "faults": (
-        "functions:faults",
+        "drive.functions:faults",
         "Show active faults, and the drive's own record where it can be read.",
     ),
     "gear": (
-        "functions:gear_command",
+        "drive.functions:gear_command",
         "Electronic gear for a screw, belt, rack or rotary table; writes only with --write.",
     ),
     "scales": (
-        "scales:app",
+        "drive.scales:app",
         "What a raw position and speed mean: show, state, or teach by a small move (moves).",
     ),
-    "braking": ("functions:braking", "Energy of braking, and the resistor that it takes."),
+    "braking": ("drive.functions:braking", "Energy of braking, and the resistor that it takes."),
     "sweep": (
-        "tools:sweep",
+        "measuring.tools:sweep",
         "Measure a frequency response and write it as JSON. The axis moves.",
     ),
     "response": (
-        "response:app",
+        "measuring.response:app",
         "Frequency responses from recordings of other programs. Nothing moves.",
     ),
     "inertia": (
-        "tools:inertia",
+        "measuring.tools:inertia",
         "Measure inertia and friction and write them as JSON. The axis moves.",
     ),
     "step": (
-        "tools:step",
+        "measuring.tools:step",
         "Command a step of speed or a move and read overshoot, settling and torque. "
         "The axis moves.",
     ),
     "friction": (
-        "friction:friction",
+        "measuring.friction:friction",
         "Map friction over speed and torque over position, both directions. The axis moves.",
     ),
     "load-side": (
-        "tools:load_side",
+        "measuring.tools:load_side",
         "Measure backlash, stiffness and transmission error with a second encoder. The axis moves.",
     ),
     "gantry": (
-        "tools:gantry",
+        "measuring.tools:gantry",
         "Measure two coupled axes together: response, skew and the margins of both loops. Both "
         "axes move.",
     ),
     "first-power": (
-        "tools:first_power",
+        "measuring.tools:first_power",
         "Before the first closed loop: supply, counts, direction, switches, brake and phase order. "
         "The axis is energised: at most 10 % of torque and 0.1 rev.",
     ),
     "health": (
-        "health:app",
+        "measuring.health:app",
         "The condition of an axis: measure, sign a baseline, repeat, compare, trend. "
         "Measuring moves it.",
     ),
     "brake-test": (
-        "tools:brake_test",
+        "measuring.tools:brake_test",
         "Torque against the closed holding brake, both directions, until the test torque or slip. "
         "The axis is energised.",
     ),
     "safety-check": (
-        "tools:safety_check",
+        "measuring.tools:safety_check",
         "Watch what the axis does when you trigger a safety function by hand: torque, stop and "
         "speed. It records and does not certify. The axis moves.",
     ),
     "shaping": (
-        "tools:shaping",
+        "measuring.tools:shaping",
         "Frequency and damping of the slow vibration after a move, input shapers for it, and the "
         "same move with one of them. The axis moves.",
     ),
     "vibration": (
-        "tools:vibration",
+        "measuring.tools:vibration",
         "Map vibration over speed, both directions: orders, frequencies and the resonances that "
         "orders excite. The axis moves.",
     ),
     "dwell": (
-        "tools:dwell",
+        "measuring.tools:dwell",
         "Vibrate at one frequency, for a person who looks for what rattles by hand and ear. The "
         "axis moves.",
     ),
     "cycle": (
-        "tools:cycle",
+        "measuring.tools:cycle",
         "Torque, speed, heat and braking energy of the machine's own cycle, from reading the drive "
         "or from a recording. Nothing is written and nothing is moved.",
     ),
     "autotune": (
-        "tune:autotune",
+        "measuring.tune:autotune",
         "Measure, design and, with --apply or --keep, verify an axis's loop gains. The axis moves.",
     ),
     "recompute": (
-        "report:recompute",
+        "measuring.report:recompute",
         "Evaluate a stored measurement again from its raw signals. Nothing moves.",
     ),
     "report": (
-        "report:report",
+        "measuring.report:report",
         "Write the commissioning report of an axis, from measurement files or a running server.",
     ),
     "handover": (
-        "handover:app",
+        "drive.handover:app",
         "Start-up lists for a machine's controller: write, compare, watch. Writes to no drive.",
     ),
-    "profile": ("profile:app", "Drive profiles: show, check, import."),
-    "audit": ("keep:audit", "Check and export the audit trail."),
-    "library": ("keep:library", "Search, export and import the library."),
+    "profile": ("drive.profile:app", "Drive profiles: show, check, import."),
+    "audit": ("server.keep:audit", "Check and export the audit trail."),
+    "library": ("server.keep:library", "Search, export and import the library."),
     "backup": (
-        "keep:backup",
+        "server.keep:backup",
         "Save everything that the station keeps. The server may run meanwhile.",
     ),
     "restore": (
-        "keep:restore",
+        "server.keep:restore",
         "Put a backup in place, after checking it as a whole. End the server first.",
     ),
-    "people": ("people:app", "Accounts of this station."),
-    "station": ("station:app", "A station as a service."),
+    "people": ("server.people:app", "Accounts of this station."),
+    "station": ("server.station:app", "A station as a service."),
     "preflight": (
-        "preflight:preflight_command",
+        "server.preflight:preflight_command",
         "Look at this computer, measure how punctual it is, and name the change that helps most.",
     ),
 }
@@ -182,7 +185,7 @@ class _Servodeck(TyperGroup):
 def _translate(command: TyperCommand | TyperGroup) -> None:
     """Help in the chosen language; the file of texts is read for that alone."""
     if language() == "zh":
-        from backend.commands.help_texts import translate
+        from backend.commands.base.help_texts import translate
 
         translate(command)
 

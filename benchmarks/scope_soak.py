@@ -35,7 +35,7 @@ import httpx
 import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from backend.commands.serve import settle
+from backend.commands.server.serve import settle
 from backend.recording.reader import RecordingReader
 from backend.station.demo import DemoBench
 from benchmarks._aims import Aim, print_verdict

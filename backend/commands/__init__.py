@@ -1,1 +1,1 @@
-"""The commands of the command line, one module per group."""
+"""The commands of the command line, one module per group; `base/` is what they share."""

@@ -30,7 +30,8 @@ class People:
     """Accounts and guests of a station.
 
     Without ``accounts_needed`` everybody who reaches the server is the same user. That is
-    permissible only on the machine's own loopback interface; `backend.commands.serve` ensures it.
+    permissible only on the machine's own loopback interface, which
+    `backend.commands.server.serve` ensures.
     """
 
     def __init__(

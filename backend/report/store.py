@@ -24,7 +24,7 @@ def render(facts: Facts, language: Language, form: Format) -> bytes:
     document = compose(facts, language)
     if form == "html":
         return render_html(document)
-    # Imported by the first PDF, or by a server after its start (`backend.commands.serve`).
+    # Imported by the first PDF, or by a server after its start (`backend.commands.server.serve`).
     from backend.report.pdf import render_pdf
 
     return render_pdf(document)

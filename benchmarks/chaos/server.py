@@ -36,7 +36,7 @@ time.time = _jumping_time
 import uvicorn  # noqa: E402
 from argon2 import PasswordHasher  # noqa: E402
 
-from backend.commands.serve import Serving, _config, _listen  # noqa: E402
+from backend.commands.server.serve import Serving, _config, _listen  # noqa: E402
 from backend.people.passwords import Passwords  # noqa: E402
 from backend.people.rights import Role  # noqa: E402
 from backend.people.station import People  # noqa: E402

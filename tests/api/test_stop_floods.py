@@ -20,7 +20,7 @@ from pathlib import Path
 import pytest
 from argon2 import PasswordHasher
 
-from backend.commands.serve import settle
+from backend.commands.server.serve import settle
 from backend.people.passwords import DEFAULT
 from backend.people.rights import Role
 from tests.support import flood

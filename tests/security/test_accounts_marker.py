@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.commands.serve import Serving, accounts_needed
+from backend.commands.server.serve import Serving, accounts_needed
 from backend.people.login.marker import FILE, AccountsMarker, AccountsMissing
 from backend.people.rights import Role
 from backend.people.station import People

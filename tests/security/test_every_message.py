@@ -17,7 +17,7 @@ from websockets.sync.client import connect
 from backend.api.live import messages as live
 from backend.api.security import socket as security_socket
 from backend.api.security.messages import MESSAGES
-from backend.commands.serve import PING_S, PONG_S
+from backend.commands.server.serve import PING_S, PONG_S
 from backend.people.identity import Actor, acting
 from backend.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast

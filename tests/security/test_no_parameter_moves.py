@@ -16,8 +16,9 @@ from typing import Any
 
 import pytest
 
-from backend.commands import local_params, remote_params, session
-from backend.commands.options import Place
+from backend.commands.base import session
+from backend.commands.base.options import Place
+from backend.commands.drive import local_params, remote_params
 from backend.drive.readings import Reading
 from backend.parameters import set_file as parameter_set
 from backend.people.rights import Right, Role

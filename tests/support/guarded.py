@@ -14,7 +14,7 @@ import httpx
 import uvicorn
 from argon2 import PasswordHasher
 
-from backend.commands.serve import Serving, _config, _listen
+from backend.commands.server.serve import Serving, _config, _listen
 from backend.people.identity import Actor, Identity, acting
 from backend.people.passwords import Passwords
 from backend.people.rights import Right, Role

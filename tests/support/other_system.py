@@ -140,7 +140,7 @@ async def serve_once() -> None:
     """The server over an empty station: address, drives, a bus that this system does not have."""
     import httpx
 
-    from backend.commands.serve import Serving, serve
+    from backend.commands.server.serve import Serving, serve
     from backend.station.bench import Bench
 
     folder = Path(tempfile.mkdtemp())

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from backend.api.app import make_app
-from backend.commands.serve import LOOPBACK, _listen
+from backend.commands.server.serve import LOOPBACK, _listen
 from backend.people.station import People
 from backend.station.bench import Bench
 from backend.station.demo import DemoBench

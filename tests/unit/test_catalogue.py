@@ -32,7 +32,7 @@ _MADE = re.compile(r"sdo-abort\.(unknown-)?(read|write)-refused(-of)?")
 
 
 def _kinds_of(error: type[DriveError]) -> set[type[DriveError]]:
-    for module in ("backend.api.app", "backend.commands.serve", "backend.cli"):
+    for module in ("backend.api.app", "backend.commands.server.serve", "backend.cli"):
         import_module(module)
     found = {error}
     for kind in error.__subclasses__():

@@ -10,7 +10,7 @@ import typer
 from typer.testing import CliRunner
 
 from backend.cli import COMMANDS, app, imported
-from backend.commands.help_texts import chinese, plain
+from backend.commands.base.help_texts import chinese, plain
 from drivers.texts.message import speaking
 
 

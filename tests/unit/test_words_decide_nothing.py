@@ -82,7 +82,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         "for word in query.words.lower().split():",
     ): "a person searches the library by words",
     (
-        "backend/commands/virtual.py",
+        "backend/commands/buses/virtual.py",
         'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
     ): "the file is a temporary one, which nobody who reads the message knows",
     (

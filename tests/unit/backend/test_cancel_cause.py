@@ -18,7 +18,7 @@ from backend.api.live.watch import _LOOK_S, SILENCE_S, SILENT_END_S
 from backend.api.security.socket import OpenSockets
 from backend.audit.facts import Fact
 from backend.audit.recorder import AuditRecorder
-from backend.commands.remote import _not_done
+from backend.commands.base.remote import _not_done
 from backend.people.identity import LOCAL, Actor, acting
 from backend.people.station import People
 from backend.station.bench import Bench

@@ -19,9 +19,10 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.commands import live, scales, session
-from backend.commands.serve import _print_problems
-from backend.commands.values import assignment, line, show_readings
+from backend.commands.base import session
+from backend.commands.drive import live, scales
+from backend.commands.drive.values import assignment, line, show_readings
+from backend.commands.server.serve import _print_problems
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
 from backend.station.bench import Bench

@@ -10,7 +10,9 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.commands import eeprom, health, preflight, response
+from backend.commands.buses import eeprom
+from backend.commands.measuring import health, response
+from backend.commands.server import preflight
 from drivers.computer.lateness import Histogram
 from drivers.texts.answers import sentences
 from drivers.texts.message import prose, speaking

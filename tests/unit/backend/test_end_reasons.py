@@ -26,7 +26,7 @@ from backend.api.live.people_views import PeopleViews
 from backend.audit import AuditLog, Fact
 from backend.audit.recorder import AuditRecorder
 from backend.audit.trail import Filter, Trail
-from backend.commands import live as command
+from backend.commands.drive import live as command
 from backend.people.identity import LOCAL
 from backend.people.rights import Right
 from backend.people.station import People
@@ -359,7 +359,7 @@ def test_every_state_of_an_identification_has_words() -> None:
 
 def test_the_page_has_its_own_title_for_every_type_of_problem() -> None:
     """RFC 9457: a title is that of the type; the page shows its own, in its own language."""
-    for module in ("backend.commands.serve", "backend.cli"):
+    for module in ("backend.commands.server.serve", "backend.cli"):
         import_module(module)
     ours = {each.kind for each in _classes(DriveError) if _is_ours(each)}
     source = (ROOT / "webui/src/i18n/texts/drive.ts").read_text("utf-8")

@@ -9,7 +9,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-from backend.commands.serve import LATE
+from backend.commands.server.serve import LATE
 
 ROOT = Path(__file__).parents[3]
 #: Each takes from a tenth of a second to a second of processor time to load.
@@ -18,7 +18,8 @@ HEAVY = (
     "scipy.optimize", "scipy.signal", "scipy.special", "scipy.stats", "trimesh", "viser",
 )  # fmt: skip
 _ASK = (
-    "import json, sys, backend.api.app, backend.commands.serve; print(json.dumps([*sys.modules]))"
+    "import json, sys, backend.api.app, backend.commands.server.serve; "
+    "print(json.dumps([*sys.modules]))"
 )
 
 

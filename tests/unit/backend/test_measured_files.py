@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import typer
 
-from backend.commands import measure
-from backend.commands.measure import Where
+from backend.commands.measuring import measure
+from backend.commands.measuring.measure import Where
 from backend.store.files import StorageFailed, require_writable
 
 WHERE = Where("canopen://can9", 1, None, None, None)

@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.commands import session
-from backend.commands.doctor import _fitting
-from backend.commands.scales import _farther
+from backend.commands.base import session
+from backend.commands.buses.doctor import _fitting
+from backend.commands.drive.scales import _farther
 from backend.station.matching import match_profiles
 from drivers.link import Found
 from tests.support.memory_link import MemoryLink

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from backend.commands.params import app
+from backend.commands.drive.params import app
 from backend.parameters.dcf import read_dcf, write_dcf
 from backend.parameters.lists import import_list
 from backend.parameters.set_file import BadSet, Row, parse

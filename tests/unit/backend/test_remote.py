@@ -11,10 +11,10 @@ import pytest
 
 from backend.api.live.messages import ScopeChannelInfo, ScopeInfo
 from backend.api.live.scope_blocks import encode_block
-from backend.commands.live import Recording
-from backend.commands.options import DEFAULT_SERVER, server_for
-from backend.commands.remote import Remote
-from backend.commands.samples import Samples, decode
+from backend.commands.base.options import DEFAULT_SERVER, server_for
+from backend.commands.base.remote import Remote
+from backend.commands.drive.live import Recording
+from backend.commands.drive.samples import Samples, decode
 from drivers.errors import OutOfRange, ProtocolError
 from drivers.link import ScopeBlock
 from drivers.texts.message import prose

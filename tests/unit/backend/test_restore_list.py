@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from backend.commands import restoring
-from backend.commands.state import STATE_FOLDER_VARIABLE, state_folder
+from backend.commands.base import restoring
+from backend.commands.base.state import STATE_FOLDER_VARIABLE, state_folder
 from backend.drive.pending_restore import PendingRestore
 from backend.restore import store as store_module
 from backend.restore.identity import DriveIdentity, identity_of

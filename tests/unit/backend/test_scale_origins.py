@@ -10,7 +10,7 @@ import pytest
 from backend.axis import teaching
 from backend.axis.axis import Axis
 from backend.axis.remembered import AxisRecord, AxisStore
-from backend.commands.scales import take_taught, taught_file
+from backend.commands.drive.scales import take_taught, taught_file
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
 from backend.drive.readings import Reading

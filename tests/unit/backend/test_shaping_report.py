@@ -7,7 +7,7 @@ from typing import Any, get_args
 import pytest
 from pydantic import ValidationError
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.shaping.result import (
     Code,
     DesignedShaper,

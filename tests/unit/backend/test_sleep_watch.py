@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from backend.commands import session
+from backend.commands.base import session
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.work import sleep_watch

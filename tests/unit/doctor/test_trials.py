@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from backend.commands.doctor import tried
+from backend.commands.buses.doctor import tried
 from drivers.doctor.diagnosis import Cause, Fact
 from drivers.doctor.examined import Examination
 from drivers.doctor.trials import MOST, trials

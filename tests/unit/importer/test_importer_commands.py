@@ -8,7 +8,7 @@ import pytest
 from importer_samples import GOOD_EDS, GOOD_ESI
 from typer.testing import CliRunner
 
-from backend.commands.profile import app
+from backend.commands.drive.profile import app
 from profiles.check import check
 from profiles.loader import drive_names, load_profile
 

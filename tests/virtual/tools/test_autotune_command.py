@@ -19,8 +19,8 @@ from backend import cli
 from backend.api.app import make_app
 from backend.axis.axis import Axis
 from backend.axis.cyclic import CyclicSession
-from backend.commands import measure, tools
-from backend.commands.remote import Remote
+from backend.commands.base.remote import Remote
+from backend.commands.measuring import measure, tools
 from backend.drive.drive import Drive
 from backend.library.measurements import unpack
 from backend.station.bench import Bench

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.brake.run import TOOL
 from backend.tools.brake.settings import BrakeSettings
 from backend.tools.sweep import profile_speed

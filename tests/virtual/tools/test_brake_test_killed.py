@@ -15,8 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from backend.commands.restoring import recall
-from backend.commands.state import STATE_FOLDER_VARIABLE
+from backend.commands.base.restoring import recall
+from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.station.bench import Bench
 from backend.tools.brake.run import TOOL
 from backend.tools.sweep import profile_speed

@@ -9,7 +9,7 @@ from __future__ import annotations
 import pytest
 from pydantic import TypeAdapter
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
 from backend.tools.autotune.tool import answer_of as answer_of_autotune

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.first_power.run import TOOL
 from backend.tools.first_power.settings import FirstPowerSettings

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.gantry.run import TOOL
 from backend.tools.tool import Run
 from drivers.cia402 import State

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.api.app import make_app
-from backend.commands import health, measure
-from backend.commands.remote import Remote
+from backend.commands.base.remote import Remote
+from backend.commands.measuring import health, measure
 from backend.station.bench import Bench
 from backend.tools.health import run as health_run
 from backend.tools.health.result import HealthRound, HealthValue

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from backend.axis.cyclic_mode import keeping_mode
-from backend.commands.restoring import recall
-from backend.commands.state import STATE_FOLDER_VARIABLE
+from backend.commands.base.restoring import recall
+from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.tools.registry import BY_KIND, TOOLS
 from backend.tools.sweep import profile_speed
 from drivers.cia402 import Mode

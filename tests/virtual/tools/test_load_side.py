@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from backend.commands.tools import lines_of
+from backend.commands.measuring.tools import lines_of
 from backend.tools.load_side.result import LoadSideResult
 from backend.tools.load_side.run import TOOL
 from drivers.errors import NotAllowed

@@ -25,8 +25,9 @@ from backend.api.app import make_app
 from backend.api.audit.audited import REPORTED_THERE
 from backend.api.security.rights import ROUTES
 from backend.axis.axis import Axis
-from backend.commands import measure, report, session
-from backend.commands.remote import Remote
+from backend.commands.base import session
+from backend.commands.base.remote import Remote
+from backend.commands.measuring import measure, report
 from backend.station.bench import Bench
 from backend.tools.friction.result import Code
 from backend.tools.inertia import run as inertia_run

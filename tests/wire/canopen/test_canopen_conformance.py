@@ -7,7 +7,7 @@ import json
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.commands.conformance import checked
+from backend.commands.buses.conformance import checked
 from drivers.canopen.link import CanopenLink
 from drivers.texts.message import speaking
 from tests.wire.canopen.conftest import Bench

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.commands.doctor import tried
+from backend.commands.buses.doctor import tried
 from backend.station.doctor import examined
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import Profile

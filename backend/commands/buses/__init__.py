@@ -1,0 +1,1 @@
+"""Commands about a bus: search, doctor, conformance, EEPROM, LSS, a virtual drive."""

@@ -1,0 +1,1 @@
+"""Commands about one drive: parameters, functions, scales, hand-over, profile, jog and scope."""

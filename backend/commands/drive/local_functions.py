@@ -1,0 +1,73 @@
+"""``servodeck io``, ``faults`` and ``gear`` on a bus that the command opens."""
+
+from __future__ import annotations
+
+from backend.api.drive.models_axis import ActiveFault
+from backend.axis.axis import Axis
+from backend.axis.fault_history import history_of, read_history
+from backend.commands.base.options import Place
+from backend.commands.base.session import drive_at
+from backend.commands.drive.function_answers import Faults, Gear, Past, Terminal, of_plan
+from backend.drive.faults import read_active_faults
+from backend.drive.terminals import read_terminals
+from backend.functions import gear as gears
+from backend.scales.gear_calculator import Mechanics
+from drivers.texts.message import language
+
+
+async def terminals(place: Place) -> list[Terminal]:
+    """All terminals, read now."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        states = await read_terminals(drive)
+    return [
+        Terminal(
+            state.terminal.name,
+            state.terminal.direction,
+            state.on,
+            state.function,
+            state.function_name,
+            state.inverted,
+            list(state.same_function),
+        )
+        for state in states
+    ]
+
+
+async def faults(place: Place) -> Faults:
+    """Active faults and the drive's own fault history, read now."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        active = await read_active_faults(drive)
+        history = history_of(drive)
+        readable = history is not None and history.kind != "unreadable"
+        past = await read_history(Axis(drive)) if readable else []
+    return Faults(
+        [
+            ActiveFault(
+                code=fault.code, name=fault.name, kind=fault.kind, causes=list(fault.causes),
+                remedies=list(fault.remedies), reset=fault.reset, source=fault.source,
+            )
+            for fault in active
+        ],
+        [
+            Past(
+                entry.name.words(language()), entry.code_text,
+                entry.fault.name if entry.fault else None,
+                {reading.key: reading.value for reading in entry.values},
+                "" if entry.problem is None else entry.problem.words(language()),
+            )
+            for entry in past
+        ],
+        0 if history is None or readable else history.size,
+    )  # fmt: skip
+
+
+async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
+    """Plan the gear for the drive's encoder, and write it with ``write``."""
+    async with drive_at(place.url, place.station, place.profile) as drive:
+        axis = Axis(drive)
+        plan = await gears.plan(axis, mechanics)
+        reported = of_plan(plan)
+        if not write:
+            return reported
+        change = await gears.write_gear(axis, plan.values)
+    return reported._replace(before=change.before, waits=change.waits)

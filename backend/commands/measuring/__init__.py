@@ -1,0 +1,1 @@
+"""Commands that measure: tools, autotune, health, report, responses from recordings."""

@@ -1,0 +1,1 @@
+"""Commands that start and keep a server: service, people, backup, preflight."""
