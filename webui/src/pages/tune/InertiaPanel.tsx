@@ -12,10 +12,10 @@ import { useAction } from '../../widgets/useAction'
 import { fixed } from '../response/bode'
 import { asInertia, type Inertia } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
-import { ValuesTable } from './Answer'
+import { ValuesTable } from './tools/Answer'
 import { MotionWarning } from './MotionWarning'
 import { SchemeFields, useScheme } from './schemes'
-import type { Measured } from './ToolPanel'
+import type { Measured } from './tools/ToolPanel'
 
 const MOVES = {
   free: 'tool.moves',

@@ -16,7 +16,7 @@ import { filesOf } from '../response/results'
 import { useMeasurement } from '../response/useMeasurements'
 import { useToolJob } from '../response/useToolJob'
 import { StepNumbers } from './StepNumbers'
-import type { Measured } from './ToolPanel'
+import type { Measured } from './tools/ToolPanel'
 
 /** A step of speed or a move, as a check of what the gains do. */
 export function StepPanel({

@@ -1,0 +1,198 @@
+import { Button, Modal, NativeSelect } from '@mantine/core'
+import { useEffect, useState } from 'react'
+import { api, ask, problemOf } from '../../../api/client'
+import type { CandidatesRequest, GainInfo, MeasurementInfo } from '../../../api/schema'
+import { known, useT } from '../../../i18n'
+import { href } from '../../../app/router'
+import { dateTime } from '../../../widgets/format'
+import { NumberField } from '../../../widgets/NumberField'
+import { Panel } from '../../../widgets/Panel'
+import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useAction } from '../../../widgets/useAction'
+import { fixed, hertz } from '../../response/bode'
+import type { Candidate } from '../../response/results'
+import { remember } from '../../response/undo'
+import { CandidateTable } from './CandidateTable'
+
+/** What the server answers when a manual documents no notch. */
+const NONE_DOCUMENTED = 'urn:servodeck:not-allowed'
+const LOADS = ['auto', 'stiff', 'medium', 'compliant'] as const
+
+/** Gains and notches computed from a stored response; one of them can be written. */
+export function CandidatesPanel({
+  drive,
+  list,
+  gains,
+  inertia,
+  onApplied,
+}: {
+  drive: string
+  list: MeasurementInfo[]
+  gains: GainInfo
+  inertia: number | null
+  onApplied: () => Promise<void>
+}) {
+  const t = useT()
+  const [chosen, setChosen] = useState('')
+  const [load, setLoad] = useState<(typeof LOADS)[number]>('auto')
+  const [total, setTotal] = useState<number | null>(null)
+  const [found, setFound] = useState<{ load: string; rows: Candidate[] } | null>(null)
+  const [asked, setAsked] = useState<Candidate | null>(null)
+  const [written, setWritten] = useState(false)
+  const design = useAction()
+  const write = useAction()
+  const total_ = inertia ?? gains.inertia_kgm2
+  useEffect(() => {
+    if (total_ !== null) setTotal(Number(total_.toPrecision(4)))
+  }, [total_])
+  const file = chosen || (list[0]?.file ?? '')
+  const go = () =>
+    design.run(async () => {
+      if (total === null) return
+      const body: CandidatesRequest = {
+        measurement: file,
+        inertia_kgm2: total,
+        load: load === 'auto' ? null : load,
+      }
+      const answer = await ask(
+        api.POST('/api/v1/drives/{drive_id}/tune/candidates', {
+          params: { path: { drive_id: drive } },
+          body,
+        }),
+      )
+      setFound({ load: answer.load, rows: answer.candidates })
+      setWritten(false)
+    })
+  const apply = (candidate: Candidate) =>
+    write.run(async () => {
+      if (total === null) return
+      // Asked first: a family without notches has nothing to write, any other failure ends it here.
+      const hasNotches = await documentsNotches(drive)
+      const path = { params: { path: { drive_id: drive } } }
+      const { speed_bandwidth_hz, integral_hz, position_1_s } = candidate.gains
+      const gains = await ask(
+        api.PUT('/api/v1/drives/{drive_id}/gains', {
+          ...path,
+          body: { gains: { speed_bandwidth_hz, integral_hz, position_1_s, inertia_kgm2: total } },
+        }),
+      )
+      // Kept at once: the way back must be there even when the notches are refused.
+      remember(drive, 'gains', gains)
+      if (hasNotches) {
+        const notches = await ask(
+          api.PUT('/api/v1/drives/{drive_id}/notches', {
+            ...path,
+            body: { notches: candidate.notches },
+          }),
+        )
+        remember(drive, 'notches', notches)
+      }
+      setWritten(true)
+      await onApplied()
+    })
+  return (
+    <Panel title={t('candidate.title')}>
+      <p className="dim">{t('candidate.help')}</p>
+      {list.length === 0 ? (
+        <p className="note info">
+          {t('candidate.measure')} <a href={href('response', drive)}>{t('page.response')}</a>
+        </p>
+      ) : (
+        <>
+          <div className="fields wide">
+            <NativeSelect
+              label={t('candidate.from')}
+              value={file}
+              onChange={(event) => setChosen(event.currentTarget.value)}
+              data={list.map((each) => ({
+                value: each.file,
+                label: `${each.drive} · ${dateTime(each.saved)}`,
+              }))}
+            />
+            <NumberField
+              label={t('gain.inertia')}
+              unit="kg·m²"
+              value={total}
+              onChange={setTotal}
+              above={0}
+            />
+            <NativeSelect
+              label={t('candidate.load')}
+              value={load}
+              onChange={(event) => setLoad(event.currentTarget.value as typeof load)}
+              data={LOADS.map((each) => ({ value: each, label: t(`load.${each}`) }))}
+            />
+          </div>
+          <Button
+            variant="filled"
+            disabled={total === null || file === ''}
+            loading={design.busy}
+            onClick={() => void go()}
+          >
+            {t('candidate.design')}
+          </Button>
+        </>
+      )}
+      <ProblemNote problem={design.problem} onClose={design.clear} />
+      {found && (
+        <>
+          <p>{t('candidate.as', { load: known(t, 'load', found.load) })}</p>
+          <CandidateTable candidates={found.rows} onApply={write.busy ? null : setAsked} />
+        </>
+      )}
+      <ProblemNote problem={write.problem} onClose={write.clear} />
+      {written && (
+        <p className="note good">
+          {t('candidate.written')} <a href={href('response', drive)}>{t('page.response')}</a>
+        </p>
+      )}
+      {asked && (
+        <Modal opened onClose={() => setAsked(null)} title={t('candidate.apply')}>
+          <p>{t('notch.confirm')}</p>
+          <ul className="num">
+            <li>
+              {t('gain.speed')}: {hertz(asked.gains.speed_bandwidth_hz)}
+            </li>
+            <li>
+              {t('gain.integral')}: {hertz(asked.gains.integral_hz)}
+            </li>
+            <li>
+              {t('gain.position')}: {fixed(asked.gains.position_1_s, 1, '1/s')}
+            </li>
+            {asked.notches.map((notch, i) => (
+              <li key={i}>
+                {t('notch.slot', { number: i + 1 })}:{' '}
+                {`${hertz(notch.center_hz)} · ${hertz(notch.width_hz)} · ${fixed(notch.depth_db, 1, 'dB')}`}
+              </li>
+            ))}
+          </ul>
+          <div className="row end">
+            <Button onClick={() => setAsked(null)}>{t('cancel')}</Button>
+            <Button
+              variant="filled"
+              onClick={() => {
+                setAsked(null)
+                void apply(asked)
+              }}
+            >
+              {t('notch.writeNow')}
+            </Button>
+          </div>
+        </Modal>
+      )}
+    </Panel>
+  )
+}
+
+/** Whether the drive's family has notches at all. */
+async function documentsNotches(drive: string): Promise<boolean> {
+  try {
+    await ask(
+      api.GET('/api/v1/drives/{drive_id}/notches', { params: { path: { drive_id: drive } } }),
+    )
+    return true
+  } catch (error) {
+    if (problemOf(error).type === NONE_DOCUMENTED) return false
+    throw error
+  }
+}
