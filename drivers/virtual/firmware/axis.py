@@ -8,17 +8,17 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from drivers.virtual.firmware import loop_parameters
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.kernel.loop import run
-from drivers.virtual.firmware.rough_torque import write_rough_torque
-from drivers.virtual.firmware.settings import (
+from drivers.virtual.firmware.objects import loop_parameters
+from drivers.virtual.firmware.objects.settings import (
     GainSet,
     ImpedanceSettings,
     LoopSettings,
     MotorData,
     ProtectionSettings,
 )
+from drivers.virtual.firmware.rough_torque import write_rough_torque
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.load_encoder import KEY as LOAD_POSITION
-from drivers.virtual.firmware.load_encoder import LoadEncoder
-from drivers.virtual.firmware.monitors import monitors
-from drivers.virtual.firmware.panel import Panel
+from drivers.virtual.firmware.motion.load_encoder import KEY as LOAD_POSITION
+from drivers.virtual.firmware.motion.load_encoder import LoadEncoder
+from drivers.virtual.firmware.objects.dictionary import Number
+from drivers.virtual.firmware.objects.monitors import monitors
+from drivers.virtual.firmware.objects.panel import Panel
 from drivers.virtual.firmware.rough_feedback import position_value, speed_value
 from drivers.virtual.firmware.states import State
 from drivers.virtual.firmware.terminals import Terminals

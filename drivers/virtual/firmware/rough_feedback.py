@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from drivers.virtual.firmware.cia402.base import RPM, Units
-from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.objects.dictionary import Number
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 from profiles.schema import Profile, Raw
 from profiles.si_unit import decode_si_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.loop_parameters import Parameters
+from drivers.virtual.firmware.objects.loop_parameters import Parameters
 from drivers.virtual.mechanics import MechanicsSpec
 
 

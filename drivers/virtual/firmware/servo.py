@@ -17,21 +17,21 @@ from drivers.virtual.device import (
     SdoAbort,
 )
 from drivers.virtual.firmware.alarms import FaultLog
-from drivers.virtual.firmware.automatic import Automatic
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.cia402.base import Family
-from drivers.virtual.firmware.commands import Commands
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
 from drivers.virtual.firmware.faults import Emergency
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.live import live_values
-from drivers.virtual.firmware.mapping import MappingRules
-from drivers.virtual.firmware.panel import Panel
-from drivers.virtual.firmware.process_data import InputImage, OutputImage, check_mapping
-from drivers.virtual.firmware.registers import RegisterTable
-from drivers.virtual.firmware.storage import Storage
+from drivers.virtual.firmware.motion.automatic import Automatic
+from drivers.virtual.firmware.motion.commands import Commands
+from drivers.virtual.firmware.objects.dictionary import Entry, ObjectDictionary
+from drivers.virtual.firmware.objects.mapping import MappingRules
+from drivers.virtual.firmware.objects.panel import Panel
+from drivers.virtual.firmware.objects.process_data import InputImage, OutputImage, check_mapping
+from drivers.virtual.firmware.objects.registers import RegisterTable
+from drivers.virtual.firmware.objects.storage import Storage
 from drivers.virtual.firmware.terminals import Terminals
 from drivers.virtual.firmware.trouble import make_trouble
 from drivers.virtual.mechanics import MechanicsSpec

@@ -7,8 +7,8 @@ from typing import Final
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.loop_parameters import TURN
-from drivers.virtual.firmware.panel import Panel
+from drivers.virtual.firmware.objects.loop_parameters import TURN
+from drivers.virtual.firmware.objects.panel import Panel
 from drivers.virtual.firmware.terminals import Terminals
 from profiles.schema import Fault
 

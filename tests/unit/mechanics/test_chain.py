@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import ProtectionSettings
+from drivers.virtual.firmware.objects.settings import ProtectionSettings
 from drivers.virtual.mechanics import (
     EncoderSpec,
     FrictionSpec,

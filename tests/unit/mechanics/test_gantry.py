@@ -12,8 +12,8 @@ from scipy.linalg import expm
 from drivers.errors import NotAllowed
 from drivers.virtual.bench import load_bench
 from drivers.virtual.firmware.factory import make_device
-from drivers.virtual.firmware.gantry import VirtualGantry
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.motion.gantry import VirtualGantry
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import GantrySpec, MechanicsSpec, gantry_response
 from tests.unit.analysis.gantry_plant import Gantry

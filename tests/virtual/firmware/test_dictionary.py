@@ -10,10 +10,10 @@ import pytest
 
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.firmware import make_device
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.families.mms7 import Mms7
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.registers import RegisterTable
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.registers import RegisterTable
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import TravelSpec
 from profiles.loader import load_profile

@@ -7,7 +7,7 @@ import pytest
 
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import GainSet, LoopSettings
+from drivers.virtual.firmware.objects.settings import GainSet, LoopSettings
 from drivers.virtual.mechanics import (
     EncoderSpec,
     FrictionSpec,

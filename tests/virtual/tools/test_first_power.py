@@ -21,7 +21,7 @@ from drivers.errors import NotAllowed
 from drivers.virtual.defects import planted
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import GainSet, LoopSettings
+from drivers.virtual.firmware.objects.settings import GainSet, LoopSettings
 from drivers.virtual.mechanics import MechanicsSpec, PhaseSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import At, settings_of

@@ -8,9 +8,9 @@ from drivers.virtual.firmware.cia402.base import RPM, Traits, Units
 from drivers.virtual.firmware.cia402.conversions import MS, TWO_PI, si_factor
 from drivers.virtual.firmware.cia402.keys import GainKeys
 from drivers.virtual.firmware.cia402.notches import notches_of
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import (
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.settings import (
     Compensation,
     GainSet,
     LoopSettings,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import Biquad, notch_biquad
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.settings import Biquad, notch_biquad
 from profiles.schema import NotchSlot, Profile
 
 

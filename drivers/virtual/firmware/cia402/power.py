@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
+from drivers.virtual.firmware.objects.settings import MotorData, ProtectionSettings
 
 I2T_S = 24.0
 #: Rectified 220 V mains; a family that states no supply uses the bench's own 48 V.

@@ -31,15 +31,15 @@ from drivers.virtual.firmware.cia402.conversions import (
 from drivers.virtual.firmware.cia402.loops import UNIT_GAIN, LoopReader
 from drivers.virtual.firmware.cia402.reports import faults_of
 from drivers.virtual.firmware.cia402.terminals import TerminalTable
-from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.objects.dictionary import Number, ObjectDictionary
+from drivers.virtual.firmware.objects.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.firmware.rough_feedback import unit_values
-from drivers.virtual.firmware.settings import LoopSettings, MotorData, ProtectionSettings
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 
 if TYPE_CHECKING:
-    from drivers.virtual.firmware.monitors import Sources
+    from drivers.virtual.firmware.objects.monitors import Sources
 
 
 class Cia402:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from drivers.virtual.firmware.cia402.base import Wiring
-from drivers.virtual.firmware.dictionary import Cell, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.objects.dictionary import Cell, ObjectDictionary
 
 InputUse = Literal[
     "negative_limit", "positive_limit", "home", "reset", "emergency", "probe1", "probe2", "gain",

@@ -10,9 +10,9 @@ from drivers.virtual.firmware.cia402.conversions import MS
 from drivers.virtual.firmware.cia402.keys import GainKeys, SwitchKeys
 from drivers.virtual.firmware.cia402.standard import Cia402
 from drivers.virtual.firmware.cia402.terminals import Input, Logic, Output, TerminalTable
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.settings import MotorData, ProtectionSettings
 from profiles.schema import Profile, Raw
 
 #: Xinlichuan DS_C: 2200h to 2203h are triggers that keep their value until they are written back to

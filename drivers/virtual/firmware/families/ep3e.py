@@ -9,9 +9,9 @@ from drivers.virtual.firmware.cia402.keys import FeedForward
 from drivers.virtual.firmware.cia402.power import MAINS_V
 from drivers.virtual.firmware.cia402.standard import Cia402
 from drivers.virtual.firmware.cia402.terminals import Input, Output, TerminalTable
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.monitors import Sources, Value
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.monitors import Sources, Value
 from profiles.schema import Profile
 
 #: Maxsine EP3E: 1010h:01 saves and restores (001:1209); 6041h bit 15 (001:372); the home offset is

@@ -35,10 +35,10 @@ from drivers.virtual.firmware.cia402.keys import (
 from drivers.virtual.firmware.cia402.power import MAINS_V
 from drivers.virtual.firmware.cia402.standard import Cia402
 from drivers.virtual.firmware.cia402.terminals import Input, Logic, Output, TerminalTable
-from drivers.virtual.firmware.dictionary import ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.monitors import Sources, Value
-from drivers.virtual.firmware.settings import MotorData, ProtectionSettings
+from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
+from drivers.virtual.firmware.objects.monitors import Sources, Value
+from drivers.virtual.firmware.objects.settings import MotorData, ProtectionSettings
 from drivers.virtual.firmware.states import State
 from profiles.schema import Profile
 

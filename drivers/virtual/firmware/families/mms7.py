@@ -20,9 +20,9 @@ from drivers.virtual.firmware.cia402.base import (
 )
 from drivers.virtual.firmware.cia402.keys import TorqueHoming
 from drivers.virtual.firmware.cia402.terminals import TerminalTable
-from drivers.virtual.firmware.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import (
+from drivers.virtual.firmware.objects.dictionary import Number, ObjectDictionary
+from drivers.virtual.firmware.objects.settings import (
     Biquad,
     GainSet,
     LoopSettings,
@@ -34,7 +34,7 @@ from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw, StiffnessTable
 
 if TYPE_CHECKING:
-    from drivers.virtual.firmware.monitors import Sources
+    from drivers.virtual.firmware.objects.monitors import Sources
 
 TWO_PI = 2 * math.pi
 _SIGNAL_OF_FUNCTION = {1: k.SIG_NEGATIVE, 2: k.SIG_POSITIVE, 3: k.SIG_HOME}  # 004:6476-6509

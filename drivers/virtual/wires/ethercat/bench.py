@@ -9,7 +9,7 @@ from pathlib import Path
 from drivers.errors import NotAllowed
 from drivers.virtual.bench import AxisSpec, load_bench
 from drivers.virtual.device import Device
-from drivers.virtual.firmware.gantry import VirtualGantry
+from drivers.virtual.firmware.motion.gantry import VirtualGantry
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics.spec import MechanicsSpec
 from drivers.virtual.wires.ethercat.slave import Slave

@@ -10,8 +10,8 @@ from drivers.virtual.device import (
     ABORT_VALUE_RANGE,
     SdoAbort,
 )
-from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
-from drivers.virtual.firmware.process_data import check_mapping
+from drivers.virtual.firmware.objects.dictionary import Entry, ObjectDictionary
+from drivers.virtual.firmware.objects.process_data import check_mapping
 from profiles.schema import Profile, Raw
 
 Check = Callable[[Raw], None]

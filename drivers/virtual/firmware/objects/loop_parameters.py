@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scipy.linalg import expm
 
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import (
+from drivers.virtual.firmware.objects.settings import (
     GainSet,
     ImpedanceSettings,
     LoopSettings,

@@ -7,9 +7,9 @@ from typing import Final
 
 from drivers.virtual.device import ABORT_STORE, SdoAbort
 from drivers.virtual.firmware.cia402.base import Family
-from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
-from drivers.virtual.firmware.nvm import Nvm
-from drivers.virtual.firmware.settings import MotorData
+from drivers.virtual.firmware.objects.dictionary import Entry, ObjectDictionary
+from drivers.virtual.firmware.objects.nvm import Nvm
+from drivers.virtual.firmware.objects.settings import MotorData
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.objects.dictionary import Number
 from drivers.virtual.firmware.terminals import Terminals
 
 _RPM = 30 / math.pi

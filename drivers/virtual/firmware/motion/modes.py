@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.homing import Homing
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.settings import ImpedanceSettings
+from drivers.virtual.firmware.motion.homing import Homing
+from drivers.virtual.firmware.objects.settings import ImpedanceSettings
 
 PP, PV, PT, HM, CSP, CSV, CST = 1, 3, 4, 6, 8, 9, 10
 IMPEDANCE = -4

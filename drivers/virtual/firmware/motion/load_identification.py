@@ -13,8 +13,8 @@ from collections.abc import Callable, Generator
 from drivers.virtual.firmware.cia402.base import RPM
 from drivers.virtual.firmware.cia402.keys import LoadKeys
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.identification import regress
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.motion.identification import regress
 from drivers.virtual.firmware.schedule import Timer
 
 _SAMPLE_S = 0.002

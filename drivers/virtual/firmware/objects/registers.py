@@ -10,7 +10,7 @@ from drivers.virtual.device import (
     ABORT_WRITE_ONLY,
     SdoAbort,
 )
-from drivers.virtual.firmware.dictionary import Entry, ObjectDictionary
+from drivers.virtual.firmware.objects.dictionary import Entry, ObjectDictionary
 from profiles.schema import Profile
 
 

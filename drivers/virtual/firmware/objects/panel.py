@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.dictionary import Number
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.objects.dictionary import Number
 
 _INPUTS, _OUTPUTS = 4, 2
 _PROBE_FUNCTION = 4  # of DI1 (probe 1) and DI2 (probe 2), 004:6480, 004:6492

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from drivers.virtual.firmware.brake import HoldingBrake
 from drivers.virtual.firmware.cia402.base import RPM
 from drivers.virtual.firmware.cia402.keys import OwnHomingKeys
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
+from drivers.virtual.firmware.motion.brake import HoldingBrake
 from drivers.virtual.firmware.schedule import Timer
 
 _REFERENCE_RPM = 1000.0

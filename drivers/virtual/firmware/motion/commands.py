@@ -7,9 +7,9 @@ from collections.abc import Callable
 from drivers.virtual.device import ABORT_DEVICE_STATE, ABORT_VALUE_RANGE, SdoAbort
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.load_identification import LoadIdentification
-from drivers.virtual.firmware.slow_store import SlowStore
-from drivers.virtual.firmware.storage import Storage
+from drivers.virtual.firmware.motion.load_identification import LoadIdentification
+from drivers.virtual.firmware.objects.slow_store import SlowStore
+from drivers.virtual.firmware.objects.storage import Storage
 from profiles.schema import Raw
 
 

@@ -11,7 +11,7 @@ from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.cia402.base import FaultInfo, OffStop
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.modes import CST, PT, Modes
+from drivers.virtual.firmware.motion.modes import CST, PT, Modes
 
 _COAST: OffStop = ("coast", "free")
 

@@ -10,7 +10,7 @@ from drivers.virtual.device import (
     ABORT_PDO_LENGTH,
     SdoAbort,
 )
-from drivers.virtual.firmware.dictionary import Entry, Number, ObjectDictionary
+from drivers.virtual.firmware.objects.dictionary import Entry, Number, ObjectDictionary
 
 _FORMAT = {
     "BOOL": "B", "INT8": "b", "UINT8": "B", "INT16": "h", "UINT16": "H",

@@ -1,0 +1,1 @@
+"""What moves the axis: modes, generators, homing, jog, identification, stops, brake, gantry."""
