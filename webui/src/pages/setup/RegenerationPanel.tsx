@@ -11,6 +11,7 @@ import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 import { useRemembered } from '../motion/remembered'
 import { useGains } from '../response/useGains'
 
@@ -41,6 +42,7 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
   const [voltage, setVoltage] = useState<number | null>(null)
   const [result, setResult] = useState<BrakingInfo | null>(null)
   const act = useAction()
+  const wrong = useWrong()
   useEffect(() => setLimits(model), [name])
   useEffect(() => {
     const known = gains?.inertia_kgm2
@@ -82,6 +84,7 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
       unit={unit}
       value={limits[key] ?? null}
       onChange={(value) => setLimits({ ...limits, [key]: value })}
+      onWrong={wrong.of(key)}
       min={0}
       optional
     />
@@ -138,13 +141,14 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
             unit="V"
             value={voltage}
             onChange={setVoltage}
+            onWrong={wrong.of('voltage')}
             above={0}
             optional
           />
         </div>
         <Button
           variant="filled"
-          disabled={[inertia, speed, time, cycle, stops, fall].includes(null)}
+          disabled={wrong.any || [inertia, speed, time, cycle, stops, fall].includes(null)}
           loading={act.busy}
           onClick={() => void calculate()}
         >
