@@ -161,6 +161,9 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
     case 'jogRefused':
       store.publish('jogRefused')
       break
+    case 'enableEnded':
+      store.publish('enableEnded')
+      break
     case 'subscriptions':
       store.keepScopeInfo(answer.numbers)
       break
