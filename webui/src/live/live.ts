@@ -82,13 +82,13 @@ function receive(message: ToPage): void {
       void refresh()
       break
     case 'state':
-      store.setState(message.state)
+      store.setState(message.state, true)
       break
     case 'drives':
-      store.setDrives(message.drives)
+      for (const drive of store.setDrives(message.drives)) void loadRows(drive).catch(() => {})
       break
     case 'values':
-      store.setReadings(message.drive, message.values)
+      store.setReadings(message.drive, message.values, true)
       break
     case 'job':
       store.setJob(message.job)
