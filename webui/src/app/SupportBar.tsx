@@ -106,6 +106,7 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
   const t = useT()
   const [held, setHeld] = useState(false)
   const stop = useRef<((why: JogStop['reason']) => void) | null>(null)
+  const pointer = useRef<number | null>(null)
   const press = () => {
     if (stop.current || document.visibilityState !== 'visible') return
     live.enablePress(invitation.id)
@@ -114,8 +115,9 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
     const release = (why: JogStop['reason']) => {
       if (stop.current !== release) return
       stop.current = null
+      pointer.current = null
       clearInterval(beat)
-      off()
+      for (const end of ends) end()
       window.removeEventListener('blur', blur)
       window.removeEventListener('pagehide', hidden)
       document.removeEventListener('visibilitychange', hidden)
@@ -127,9 +129,12 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
     window.addEventListener('blur', blur)
     window.addEventListener('pagehide', hidden)
     document.addEventListener('visibilitychange', hidden)
-    const off = subscribe('link', () => {
-      if (!contents.link.open) release('connection-lost')
-    })
+    const ends = [
+      subscribe('link', () => {
+        if (!contents.link.open) release('connection-lost')
+      }),
+      subscribe('enableEnded', () => release('page-silent')),
+    ]
     stop.current = release
   }
   const release = () => stop.current?.('released')
@@ -137,6 +142,7 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
   const down = (event: PointerEvent<HTMLButtonElement>) => {
     if (event.button !== 0) return
     event.currentTarget.setPointerCapture(event.pointerId)
+    pointer.current = event.pointerId
     press()
   }
   return (
@@ -145,6 +151,10 @@ function EnablingButton({ invitation }: { invitation: InvitationView }) {
       className={`enabling ${held ? 'held' : ''}`}
       aria-pressed={held}
       onPointerDown={down}
+      // A mouse whose other button is held down as well lets go of this one with a move alone.
+      onPointerMove={(event) => {
+        if (pointer.current === event.pointerId && (event.buttons & 1) === 0) release()
+      }}
       onPointerUp={release}
       onPointerCancel={release}
       onLostPointerCapture={release}

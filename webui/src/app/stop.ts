@@ -7,13 +7,21 @@ import { contents, publish, subscribe } from '../live/store'
 export interface StopReport {
   at: number
   answer: StopResult | null
-  /** Set when neither way to the server worked. */
+  /** Set when neither way to the server worked, or nothing says that one did. */
   failure: string | null
   /** The quick stop has gone out; whether the axes stand is being measured. */
   taken: boolean
 }
 
+/**
+ * The quick stop goes out within less than this. A network that swallows everything keeps a request
+ * waiting for minutes; whoever stands at the machine must not wait for it.
+ */
+const TAKEN_MS = 3000
+
 let report: StopReport | null = null
+/** The STOP whose request has neither an answer nor an error yet, by its time. */
+let waiting: number | null = null
 
 export const currentReport = () => report
 
@@ -49,7 +57,11 @@ export async function stopEverything(): Promise<void> {
     console.error('STOP could not be sent over the websocket', error)
   }
   report = mine
+  waiting = mine.at
   publish('stop')
+  setTimeout(() => {
+    if (report?.at === mine.at && !report.taken) doubt()
+  }, TAKEN_MS)
   try {
     const answer = await request
     if (!answer.ok) throw new Error(`HTTP ${answer.status}`)
@@ -67,8 +79,12 @@ export async function stopEverything(): Promise<void> {
 export function listenForAnswers(): void {
   subscribe('stopTaken', () => {
     if (report === null || report.answer !== null) return
-    report = { ...report, taken: true }
+    // What was doubted for want of an answer is known now; a request that failed says no more.
+    report = { ...report, taken: true, failure: waiting === report.at ? null : report.failure }
     publish('stop')
+  })
+  subscribe('link', () => {
+    if (!contents.link.open) doubt()
   })
   subscribe('stopReached', () => {
     const reached = contents.stopReached
@@ -78,7 +94,15 @@ export function listenForAnswers(): void {
   })
 }
 
+/** Nothing says that the axes stand: the emergency stop of the machine is named. */
+function doubt(): void {
+  if (report === null || report.answer !== null || report.failure !== null) return
+  report = { ...report, failure: 'unknown' }
+  publish('stop')
+}
+
 function finish(mine: StopReport, result: Pick<StopReport, 'answer' | 'failure'>): void {
+  if (waiting === mine.at) waiting = null
   if (report?.at !== mine.at) return
   // The verdicts have come by the websocket already.
   if (result.answer === null && report.answer !== null) return

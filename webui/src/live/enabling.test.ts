@@ -52,3 +52,40 @@ describe('the enabling button', () => {
     expect(sent).toEqual(['enable_press', 'enable_release'])
   })
 })
+
+describe('a hold that the worker ends', () => {
+  it('is reported to the page, which would else go on showing it as held', () => {
+    let ended = 0
+    let time = 0
+    const hold = new EnablingHold(
+      () => true,
+      () => time,
+      () => ended++,
+    )
+    hold.press('i')
+    time = SILENCE_MS + 1
+    hold.tick()
+    expect(ended).toBe(1)
+    hold.beat()
+    hold.tick()
+    hold.press('i')
+    hold.release('released')
+    expect(ended).toBe(1)
+  })
+  it('is reported also where its message could not be sent', () => {
+    let ended = 0
+    let open = false
+    const hold = new EnablingHold(
+      () => open,
+      () => 0,
+      () => ended++,
+    )
+    hold.press('i')
+    expect(ended).toBe(1)
+    open = true
+    hold.press('i')
+    open = false
+    hold.tick()
+    expect(ended).toBe(2)
+  })
+})

@@ -20,11 +20,13 @@ export class EnablingHold {
   constructor(
     private readonly send: Send,
     private readonly now: () => number,
+    /** The hold has ended by itself, not by a release of the page. */
+    private readonly lost: () => void = () => {},
   ) {}
 
   press(invitation: string): void {
     if (this.invitation !== null) this.release('another-guest')
-    if (!this.send({ type: 'enable_press', invitation })) return
+    if (!this.send({ type: 'enable_press', invitation })) return this.lost()
     this.invitation = invitation
     this.heard = this.now()
   }
@@ -38,9 +40,12 @@ export class EnablingHold {
 
   tick(): void {
     if (this.invitation === null) return
-    if (this.now() - this.heard > SILENCE_MS) this.release('page-silent')
-    else if (!this.send({ type: 'enable_renew', invitation: this.invitation })) {
+    if (this.now() - this.heard > SILENCE_MS) {
+      this.release('page-silent')
+      this.lost()
+    } else if (!this.send({ type: 'enable_renew', invitation: this.invitation })) {
       this.invitation = null
+      this.lost()
     }
   }
 

@@ -81,13 +81,13 @@ function receive(message: ToPage): void {
       void refresh()
       break
     case 'state':
-      store.setState(message.state)
+      store.setState(message.state, true)
       break
     case 'drives':
-      store.setDrives(message.drives)
+      for (const drive of store.setDrives(message.drives)) void loadRows(drive).catch(() => {})
       break
     case 'values':
-      store.setReadings(message.drive, message.values)
+      store.setReadings(message.drive, message.values, true)
       break
     case 'job':
       store.setJob(message.job)
@@ -159,6 +159,9 @@ worker.onmessage = (event: MessageEvent<FromWorker>) => {
       break
     case 'jogRefused':
       store.publish('jogRefused')
+      break
+    case 'enableEnded':
+      store.publish('enableEnded')
       break
     case 'subscriptions':
       store.keepScopeInfo(answer.numbers)

@@ -177,3 +177,19 @@ describe('spectrum', () => {
     expect(Math.abs(loudest(count - 5) - 200)).toBeLessThan(10)
   })
 })
+
+describe('a computed channel whose clock begins again, as after a restart of the server', () => {
+  it('goes on with the new times', () => {
+    const ring = new Ring(1024)
+    const channel = new MathsChannel('integral(c1)', 1024, () => new Trace(ring))
+    for (let i = 0; i < 5; i++) ring.push(1000 + i, 1)
+    channel.advance()
+    expect(channel.trace.ring.newest).toBe(1004)
+    for (let i = 0; i < 3; i++) ring.push(10 + i, 1)
+    channel.advance()
+    expect(channel.trace.ring.length).toBe(3)
+    expect(channel.trace.ring.newest).toBe(12)
+    // Counted from the first new sample.
+    expect(channel.trace.value(2)).toBe(2)
+  })
+})

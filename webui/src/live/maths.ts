@@ -1,4 +1,4 @@
-import { channelsOf, compile, parse, type Step } from './expression'
+import { channelsOf, compile, type Node, parse, type Step } from './expression'
 import { Ring, Trace } from './ring'
 
 /**
@@ -7,9 +7,12 @@ import { Ring, Trace } from './ring'
  */
 export class MathsChannel {
   readonly trace: Trace
-  private readonly step: Step
+  private readonly tree: Node
+  private step: Step
   private readonly names: string[]
   private done = Number.NEGATIVE_INFINITY
+  /** Of the channel that gives the times, when the last sample of it was taken. */
+  private begun: number | null = null
 
   /** Throws ExpressionError; a text without any channel has no times and gives nothing. */
   constructor(
@@ -17,9 +20,9 @@ export class MathsChannel {
     capacity: number,
     private readonly find: (name: string) => Trace | null,
   ) {
-    const tree = parse(expression)
-    this.names = channelsOf(tree)
-    this.step = compile(tree)
+    this.tree = parse(expression)
+    this.names = channelsOf(this.tree)
+    this.step = compile(this.tree)
     this.trace = new Trace(new Ring(capacity))
   }
 
@@ -33,6 +36,15 @@ export class MathsChannel {
     }
     const base = inputs.get(this.names[0] ?? '')
     if (!base) return
+    if (base.ring.begun !== this.begun) {
+      // Its clock is another one: what was computed by the former has nothing to do with it.
+      if (this.begun !== null) {
+        this.step = compile(this.tree)
+        this.trace.ring.clear()
+      }
+      this.begun = base.ring.begun
+      this.done = Number.NEGATIVE_INFINITY
+    }
     const until = Math.min(...[...inputs.values()].map(({ ring }) => ring.newest ?? this.done))
     const { ring } = base
     for (let row = ring.firstAfter(this.done); row < ring.length; row++) {

@@ -1,15 +1,18 @@
 import { describe, expect, it } from 'vitest'
-import type { AxisState, JobInfo, ParameterValue } from '../api/schema'
+import type { AxisState, DriveSummary, JobInfo, ParameterRow, ParameterValue } from '../api/schema'
 import {
   askedAgain,
   contents,
   endForgotten,
   FORGOTTEN,
+  setDrives,
   setJob,
   setLink,
   setReadings,
+  setRows,
   setState,
   subscribe,
+  whenGone,
 } from './store'
 
 const job = (state: JobInfo['state']): JobInfo => ({
@@ -72,6 +75,59 @@ describe('the store', () => {
     expect(contents.states.get('y')?.fresh).toBe(false)
     setState(state('2026-01-01T00:00:05Z'))
     expect(contents.states.get('y')?.fresh).toBe(true)
+  })
+  it('follows a server whose clock was set back, and no answer that was only overtaken', () => {
+    const state = (time: string, word: string) => ({ drive: 'z', time, state: word }) as AxisState
+    setState(state('2026-01-01T10:00:00Z', 'Operation enabled'), true)
+    setState(state('2026-01-01T09:00:00Z', 'Switched on'))
+    expect(contents.states.get('z')?.state).toBe('Operation enabled')
+    setState(state('2026-01-01T09:59:59Z', 'Switched on'), true)
+    expect(contents.states.get('z')?.state).toBe('Operation enabled')
+    setState(state('2026-01-01T09:00:01Z', 'Fault'), true)
+    expect(contents.states.get('z')?.state).toBe('Fault')
+    setReadings('z', [reading(1, '2026-01-01T10:00:00Z')], true)
+    setReadings('z', [reading(2, '2026-01-01T09:00:00Z')], true)
+    expect(contents.readings.get('z')?.get('6083:00')?.raw).toBe(2)
+  })
+  it('takes times without fractions of a second for what they are', () => {
+    const state = (time: string, word: string) => ({ drive: 'w', time, state: word }) as AxisState
+    setState(state('2026-01-01T10:00:00Z', 'Switched on'), true)
+    setState(state('2026-01-01T10:00:00.500000Z', 'Operation enabled'), true)
+    expect(contents.states.get('w')?.state).toBe('Operation enabled')
+  })
+  it('takes what a restarted server says, whatever its clock', () => {
+    const open = { open: true, attempt: 0, roundTripMs: null }
+    const state = (time: string) => ({ drive: 'v', time, fresh: true }) as AxisState
+    setLink(open, 0)
+    setState(state('2026-01-01T10:00:00Z'), true)
+    setReadings('v', [reading(1, '2026-01-01T10:00:00Z')])
+    setLink({ ...open, open: false, attempt: 1 }, 1)
+    setLink(open, 2)
+    setState(state('2026-01-01T09:59:58Z'), true)
+    setReadings('v', [{ ...reading(1, ''), raw: null, value: null, time: null }])
+    expect(contents.states.get('v')?.fresh).toBe(true)
+    expect(contents.readings.get('v')?.get('6083:00')?.raw).toBeNull()
+  })
+  it('keeps nothing of a drive that is gone, whose id another one may get', () => {
+    const drive = (id: string, profile: string) => ({ id, profile }) as DriveSummary
+    const fill = (id: string) => {
+      setState({ drive: id, time: '2026-01-01T10:00:00Z', fresh: true } as AxisState)
+      setRows(id, [{ key: '6083:00', reading: reading(1, '2026-01-01T10:00:00Z') } as ParameterRow])
+    }
+    const gone: string[] = []
+    whenGone((id) => gone.push(id))
+    expect(setDrives([drive('a', 'p'), drive('b', 'p')])).toEqual([])
+    fill('a')
+    fill('b')
+    expect(setDrives([drive('a', 'p'), drive('b', 'p')])).toEqual([])
+    expect(contents.rows.has('a')).toBe(true)
+    expect(setDrives([drive('b', 'other')])).toEqual(['b'])
+    expect([contents.rows.has('a'), contents.states.has('a'), contents.readings.has('b')]).toEqual([
+      false,
+      false,
+      false,
+    ])
+    expect(gone).toEqual(['a', 'b'])
   })
   it('ends jobs that the server has forgotten, and no others', () => {
     setJob({ ...job('running'), id: 'old' })

@@ -126,21 +126,72 @@ export function setLink(link: LinkState, now: number): void {
   else if (contents.everOpen && contents.lostAt === null) {
     contents.lostAt = now
     for (const state of contents.states.values()) {
-      contents.states.set(state.drive, { ...state, fresh: false, problem: '' })
+      const old = { ...state, fresh: false, problem: '', problem_message: null }
+      contents.states.set(state.drive, old)
+      former.add(old)
       publish(`state ${state.drive}`)
+    }
+    for (const readings of contents.readings.values()) {
+      for (const value of readings.values()) former.add(value)
     }
   }
   publish('link')
 }
 
-export function setDrives(drives: DriveSummary[]): void {
+/**
+ * The drives as they are now. An id is used again: of one that is gone, or of another profile than
+ * before, nothing that was said holds. Returns those that are there and of which more was known.
+ */
+export function setDrives(drives: DriveSummary[]): string[] {
+  const changed = (contents.drives ?? []).filter(
+    (old) => drives.find((each) => each.id === old.id)?.profile !== old.profile,
+  )
   contents.drives = drives
+  const again: string[] = []
+  for (const { id } of changed) {
+    const known = contents.rows.delete(id)
+    contents.states.delete(id)
+    contents.readings.delete(id)
+    if (known && drives.some((each) => each.id === id)) again.push(id)
+    for (const act of goneListeners) act(id)
+  }
   publish('drives')
+  for (const { id } of changed) {
+    for (const topic of ['state', 'rows', 'values']) publish(`${topic} ${id}`)
+  }
+  return again
 }
 
-export function setState(state: AxisState): void {
+const goneListeners: ((drive: string) => void)[] = []
+
+/** Called with a drive of which nothing that was said holds any more. */
+export function whenGone(act: (drive: string) => void): void {
+  goneListeners.push(act)
+}
+
+/** What was said over a connection that is lost: the next word of it replaces it. */
+const former = new WeakSet<AxisState | ParameterValue>()
+/** No answer is overtaken by more than this: the clock of the server was set back. */
+const OVERTAKEN_MS = 5000
+
+/**
+ * Whether something was overtaken on its way by what is known already. `streamed`: it came over
+ * the websocket, which keeps the order; only an answer to a request may have been faster.
+ */
+function overtaken(
+  known: AxisState | ParameterValue,
+  time: string | null,
+  streamed: boolean,
+): boolean {
+  if (former.has(known) || !known.time) return false
+  if (!time) return true
+  const behind = Date.parse(known.time) - Date.parse(time)
+  return behind > 0 && !(streamed && behind > OVERTAKEN_MS)
+}
+
+export function setState(state: AxisState, streamed = false): void {
   const known = contents.states.get(state.drive)
-  if (known && state.time < known.time) return // overtaken on its way
+  if (known && overtaken(known, state.time, streamed)) return
   contents.states.set(state.drive, state)
   publish(`state ${state.drive}`)
 }
@@ -183,12 +234,12 @@ export function setRows(drive: string, rows: ParameterRow[]): void {
 }
 
 /** Newer readings replace older ones; an answer that was overtaken on its way changes nothing. */
-export function setReadings(drive: string, values: ParameterValue[]): void {
+export function setReadings(drive: string, values: ParameterValue[], streamed = false): void {
   const known = new Map(contents.readings.get(drive))
   const changed: string[] = []
   for (const value of values) {
     const old = known.get(value.key)
-    if (old?.time && (!value.time || value.time < old.time)) continue
+    if (old && overtaken(old, value.time, streamed)) continue
     known.set(value.key, value)
     changed.push(value.key)
   }

@@ -133,6 +133,8 @@ export type FromWorker =
   | { kind: 'jogRefused' }
   /** Is the button still held? Answered with `jogBeat`. */
   | { kind: 'jogAsked' }
+  /** The enabling button counts as released, though nobody may have let it go. */
+  | { kind: 'enableEnded' }
   | { kind: 'subscriptions'; numbers: number[] }
   | { kind: 'triggered'; state: TriggerState }
   | { kind: 'answer'; id: number; answer: Questions[QuestionKind]['get'] }

@@ -39,6 +39,7 @@ const deadMan = new DeadMan(
 const enabling = new EnablingHold(
   (message) => socket.send(message),
   () => performance.now(),
+  () => post({ kind: 'enableEnded' }),
 )
 
 setInterval(() => {

@@ -2,7 +2,7 @@ import { useRef } from 'react'
 import { figure } from '../widgets/format'
 import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
-import { ticks } from './XyPlot'
+import { ticks } from './ticks'
 
 const LEFT = 62
 const BOTTOM = 40

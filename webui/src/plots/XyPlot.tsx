@@ -2,6 +2,7 @@ import { useMemo, useRef } from 'react'
 import { figure } from '../widgets/format'
 import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
+import { range, ticks } from './ticks'
 import { nearestPoint, pointAt, type Range } from './xy-points'
 
 const LEFT = 62
@@ -114,27 +115,4 @@ function rule(ctx: CanvasRenderingContext2D, x0: number, y0: number, x1: number,
   ctx.moveTo(x0, y0)
   ctx.lineTo(x1, y1)
   ctx.stroke()
-}
-
-/** Range with some air, never of no size. */
-function range(values: number[]): Range {
-  let min = Number.POSITIVE_INFINITY
-  let max = Number.NEGATIVE_INFINITY
-  for (const value of values) {
-    if (value < min) min = value
-    if (value > max) max = value
-  }
-  if (min > max) return [-1, 1]
-  const air = (max - min) * 0.05 || Math.abs(max) * 0.1 || 1
-  return [min - air, max + air]
-}
-
-/** About `count` round values of a range. */
-export function ticks(min: number, max: number, count: number): number[] {
-  const rough = (max - min) / Math.max(1, count)
-  const power = 10 ** Math.floor(Math.log10(rough))
-  const step = ([1, 2, 5, 10].find((each) => each * power >= rough) ?? 10) * power
-  const found: number[] = []
-  for (let n = Math.ceil(min / step); n * step <= max; n++) found.push(n * step)
-  return found
 }

@@ -52,3 +52,14 @@ describe('y scales', () => {
     }
   })
 })
+
+describe('a scale of samples that differ by their last digit', () => {
+  it('is high enough for a drawing to find ticks in it', () => {
+    for (const at of [1, -7, 1e9, 123456.789, 1e-9]) {
+      const { min, max } = withAir({ min: at, max: at + Math.abs(at) * Number.EPSILON })
+      // A step of a hundredth of it changes the number that it is added to.
+      expect(Math.abs(at) + (max - min) / 100).toBeGreaterThan(Math.abs(at))
+      expect((max - min) / Math.abs(at)).toBeGreaterThan(1e-12)
+    }
+  })
+})

@@ -7,6 +7,11 @@ export interface Span {
 /** Room above and below what an automatic scale shows. */
 const AIR = 0.08
 const WHEEL_ZOOM = 1.25
+/**
+ * Least height of a scale that follows its samples, as part of the greatest number on it: with less
+ * the ticks are nearer to each other than two numbers can be, and the search for them has no end.
+ */
+export const LEAST_HEIGHT = 1e-11
 
 /** Grows over all that is seen; `span` is null while nothing was. */
 export class Extent {
@@ -26,7 +31,11 @@ export class Extent {
 /** What an automatic scale shows: all that was seen with some air, never of no height. */
 export function withAir(seen: Span | null): Span {
   if (!seen) return { min: -1, max: 1 }
-  const air = (seen.max - seen.min) * AIR || Math.abs(seen.max) * 0.1 || 1
+  const least = Math.max(Math.abs(seen.min), Math.abs(seen.max)) * LEAST_HEIGHT
+  const air =
+    seen.max === seen.min
+      ? Math.abs(seen.max) * 0.1 || 1
+      : Math.max((seen.max - seen.min) * AIR, least)
   return { min: seen.min - air, max: seen.max + air }
 }
 

@@ -1,6 +1,7 @@
 import { TextInput } from '@mantine/core'
-import { useEffect, useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
 import { useT } from '../i18n'
+import { faultOf, toNumber } from './number-text'
 
 /** A number with its unit. Says at once what is wrong; `null` while it is not a valid number. */
 export function NumberField({
@@ -8,6 +9,7 @@ export function NumberField({
   unit,
   value,
   onChange,
+  onWrong,
   min,
   max,
   above,
@@ -21,6 +23,8 @@ export function NumberField({
   unit?: string
   value: number | null
   onChange: (value: number | null) => void
+  /** Whether it holds something that is not allowed, and not just nothing. */
+  onWrong?: (wrong: boolean) => void
   min?: number
   max?: number
   /** Exclusive lower limit. */
@@ -34,28 +38,26 @@ export function NumberField({
 }) {
   const t = useT()
   const [text, setText] = useState(value === null ? '' : String(value))
+  const tell = useRef(onWrong)
+  tell.current = onWrong
   useEffect(() => {
     // A value set from elsewhere replaces the text; one's own typing is left as typed.
-    setText((typed) => (value !== null && toNumber(typed) !== value ? String(value) : typed))
+    if (value === null || toNumber(text) === value) return
+    setText(String(value))
+    tell.current?.(false)
   }, [value])
+  // What was typed goes with the field.
+  useEffect(() => () => tell.current?.(false), [])
   // An empty form is not a mistake yet; a field that was emptied or left empty is.
   const [touched, setTouched] = useState(false)
-  const number = toNumber(text)
-  let problem: string | null = null
-  if (text.trim() === '') problem = optional || !touched ? null : t('number.missing')
-  else if (number === null) problem = t('number.bad')
-  else if (integer && !Number.isInteger(number)) problem = t('number.whole')
-  else if (above !== undefined && number <= above) problem = t('number.above', { limit: above })
-  else if (below !== undefined && number >= below) problem = t('number.below', { limit: below })
-  else if (min !== undefined && number < min) problem = t('number.low', { limit: min })
-  else if (max !== undefined && number > max) problem = t('number.high', { limit: max })
-  const valid = (candidate: number | null) =>
-    candidate !== null &&
-    (!integer || Number.isInteger(candidate)) &&
-    (above === undefined || candidate > above) &&
-    (below === undefined || candidate < below) &&
-    (min === undefined || candidate >= min) &&
-    (max === undefined || candidate <= max)
+  const bounds = { min, max, above, below, integer }
+  const empty = text.trim() === ''
+  const fault = empty ? null : faultOf(text, bounds)
+  const problem = fault
+    ? t(fault.key, 'limit' in fault ? { limit: fault.limit } : {})
+    : empty && touched && !optional
+      ? t('number.missing')
+      : null
   return (
     <TextInput
       className="number-field"
@@ -73,15 +75,11 @@ export function NumberField({
       onChange={(event) => {
         setTouched(true)
         setText(event.currentTarget.value)
-        const next = toNumber(event.currentTarget.value)
-        onChange(valid(next) ? next : null)
+        const next = event.currentTarget.value
+        const wrong = next.trim() !== '' && faultOf(next, bounds) !== null
+        onChange(wrong ? null : toNumber(next))
+        onWrong?.(wrong)
       }}
     />
   )
-}
-
-function toNumber(text: string): number | null {
-  const plain = text.trim().replace('−', '-').replace(',', '.')
-  if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(plain)) return null
-  return Number(plain)
 }

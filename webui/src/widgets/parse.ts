@@ -18,6 +18,7 @@ export function parseTyped(info: ParameterInfo, text: string, asRaw: boolean): T
     return { ok: false, why: 'number' }
   }
   const number = Number(trimmed)
+  if (!Number.isFinite(number)) return { ok: false, why: 'long' }
   const raw = hex || asRaw || Object.keys(info.enum).length > 0
   const scaled = raw ? number : (number - info.offset) / info.scale
   const whole = isInteger(info.type)

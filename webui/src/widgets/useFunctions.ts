@@ -1,11 +1,11 @@
 import { useCallback, useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../api/client'
 import type { AxisRecordInfo, Functions, Problem } from '../api/schema'
-import { publish, useLink, useStore } from '../live/store'
+import { publish, useLink, useStore, whenGone } from '../live/store'
 
 const known = new Map<string, Functions>()
 
-/** What the drive's functions consist of; null until it is known. It never changes. */
+/** What the drive's functions consist of; null until it is known. Of one drive it never changes. */
 export function useFunctions(drive: string): Functions | null {
   const { open } = useLink()
   const functions = useStore(`functions ${drive}`, () => known.get(drive) ?? null)
@@ -20,11 +20,18 @@ export function useFunctions(drive: string): Functions | null {
       },
       () => {}, // asked again when the connection is back
     )
-  }, [drive, open])
+  }, [drive, open, functions === null])
   return functions
 }
 
 const records = new Map<string, AxisRecordInfo>()
+
+whenGone((drive) => {
+  known.delete(drive)
+  records.delete(drive)
+  publish(`functions ${drive}`)
+  publish(`record ${drive}`)
+})
 
 export function setRecord(drive: string, record: AxisRecordInfo): void {
   records.set(drive, record)

@@ -31,8 +31,15 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
   const [url, setUrl] = useState('')
   const [station, setStation] = useState<number | string>(drive.ports[0]?.station ?? 1)
   const connect = useAction()
-  const add = (accept_difference: boolean) =>
-    connect.run(() =>
+  const place = `${url.trim()} ${station}`
+  const [tried, setTried] = useState('')
+  const retype = (change: () => void) => {
+    change()
+    connect.clear()
+  }
+  const add = (accept_difference: boolean) => {
+    setTried(place)
+    return connect.run(() =>
       ask(
         api.POST('/api/v1/drives/{drive_id}/ports', {
           params: { path: { drive_id: drive.id } },
@@ -40,8 +47,9 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
         }),
       ),
     )
-  // Only a comparison of settings names a parameter.
-  const differs = connect.problem?.status === 409 && connect.problem.parameter
+  }
+  // Only a comparison of settings names a parameter; what it found is of the port that was tried.
+  const differs = connect.problem?.status === 409 && connect.problem.parameter && tried === place
   const say = useSay(drive.id)
   const groups =
     port.groups.slice(0, GROUPS_SHOWN).map(say).join(', ') +
@@ -66,7 +74,10 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
           value={url}
           spellCheck={false}
           autoCapitalize="off"
-          onChange={(event) => setUrl(event.currentTarget.value)}
+          onChange={(event) => {
+            const { value } = event.currentTarget
+            retype(() => setUrl(value))
+          }}
         />
         <NumberInput
           label={t('port.station')}
@@ -74,7 +85,7 @@ function Missing({ drive, port }: { drive: DriveSummary; port: MissingPort }) {
           min={0}
           max={65535}
           allowDecimal={false}
-          onChange={setStation}
+          onChange={(value) => retype(() => setStation(value))}
         />
         <Button
           variant="filled"

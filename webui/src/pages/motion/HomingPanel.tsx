@@ -12,6 +12,7 @@ import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/useObstacle'
+import { useWrong } from '../../widgets/useWrong'
 import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
 import { HomingPicture } from './HomingPicture'
 import { useRemembered } from './remembered'
@@ -61,7 +62,10 @@ export function HomingPanel({
     })
   }, [drive, open, load.run])
   const method = methods.find((each) => each.method === number) ?? null
-  const complete = method !== null && travel !== null && torque !== null && time !== null
+  const wrong = useWrong()
+  // An optional field that holds something else than a number is not the drive's own value.
+  const complete =
+    !wrong.any && method !== null && travel !== null && torque !== null && time !== null
   const go = () =>
     start.run(async () => {
       if (number === null || travel === null || torque === null || time === null) return
@@ -111,14 +115,35 @@ export function HomingPanel({
         </>
       )}
       <div className="fields">
-        <Speed units={units} label={t('homing.fast')} value={fast} onChange={setFast} optional />
-        <Speed units={units} label={t('homing.slow')} value={slow} onChange={setSlow} optional />
-        <Acceleration units={units} value={acceleration} onChange={setAcceleration} optional />
+        <Speed
+          units={units}
+          label={t('homing.fast')}
+          value={fast}
+          onChange={setFast}
+          onWrong={wrong.of('fast')}
+          optional
+        />
+        <Speed
+          units={units}
+          label={t('homing.slow')}
+          value={slow}
+          onChange={setSlow}
+          onWrong={wrong.of('slow')}
+          optional
+        />
+        <Acceleration
+          units={units}
+          value={acceleration}
+          onChange={setAcceleration}
+          onWrong={wrong.of('acceleration')}
+          optional
+        />
         <NumberField
           label={t('homing.offset')}
           unit={units.position ?? ''}
           value={offset}
           onChange={setOffset}
+          onWrong={wrong.of('offset')}
           optional
         />
         <TravelLimit units={units} value={travel} onChange={setTravel} />

@@ -205,6 +205,10 @@ function JogButton({
     pointer.current = null
     hold.release(reason)
   }
+  // A mouse whose other button is held down as well lets go of this one with a move alone.
+  const move = (event: PointerEvent) => {
+    if ((event.buttons & 1) === 0) up('released')(event)
+  }
   return (
     <button
       type="button"
@@ -214,6 +218,7 @@ function JogButton({
       aria-pressed={held === towards}
       aria-disabled={disabled}
       onPointerDown={down}
+      onPointerMove={move}
       onPointerUp={up('released')}
       onPointerCancel={up('pointer-cancelled')}
       onLostPointerCapture={up('pointer-cancelled')}

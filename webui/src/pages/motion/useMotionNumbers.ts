@@ -6,6 +6,8 @@ export interface Typed {
   value: number | null
   min?: number
   onChange: (value: number | null) => void
+  /** See NumberField. */
+  onWrong?: (wrong: boolean) => void
 }
 
 /**

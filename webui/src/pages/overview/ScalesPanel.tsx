@@ -11,6 +11,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 
 /** Scales with their origins; folded while they are certain, with ways to teach them. */
 export function ScalesPanel({ drive }: { drive: string }) {
@@ -196,6 +197,7 @@ function StateThem({ drive, busy, change }: { drive: string; busy: boolean; chan
         }),
       ),
     )
+  const wrong = useWrong()
   const nothing = counts === null && perRpm === null && perRpmS === null
   return (
     <div className="stack">
@@ -203,6 +205,7 @@ function StateThem({ drive, busy, change }: { drive: string; busy: boolean; chan
         label={t('scales.countsPerRev')}
         value={counts}
         onChange={setCounts}
+        onWrong={wrong.of('counts')}
         above={0}
         optional
       />
@@ -210,6 +213,7 @@ function StateThem({ drive, busy, change }: { drive: string; busy: boolean; chan
         label={t('scales.rawPerRpm')}
         value={perRpm}
         onChange={setPerRpm}
+        onWrong={wrong.of('rpm')}
         above={0}
         optional
       />
@@ -217,10 +221,11 @@ function StateThem({ drive, busy, change }: { drive: string; busy: boolean; chan
         label={t('scales.rawPerRpmS')}
         value={perRpmS}
         onChange={setPerRpmS}
+        onWrong={wrong.of('rpmS')}
         above={0}
         optional
       />
-      <Button disabled={nothing || busy} onClick={() => void keep()}>
+      <Button disabled={nothing || wrong.any || busy} onClick={() => void keep()}>
         {t('scales.keep')}
       </Button>
     </div>

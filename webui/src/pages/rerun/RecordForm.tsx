@@ -9,6 +9,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 import { storedChannels } from '../scope/channels'
 import { useScopeChannels } from '../scope/useScope'
 
@@ -33,6 +34,7 @@ export function RecordForm({ onStarted }: { onStarted: () => void }) {
   const [faultOf, setFaultOf] = useState('')
   const [before, setBefore] = useState<number | null>(1)
   const [seconds, setSeconds] = useState<number | null>(null)
+  const wrong = useWrong()
   const on = channels[place] ?? channels[0]
   const info = on ? infos.get(`${on.drive} ${on.key}`) : undefined
   const trigger = (): Trigger | null => {
@@ -124,6 +126,7 @@ export function RecordForm({ onStarted }: { onStarted: () => void }) {
             label={t('recordings.mask')}
             value={mask}
             onChange={setMask}
+            onWrong={wrong.of('mask')}
             optional
             integer
             min={1}
@@ -136,6 +139,7 @@ export function RecordForm({ onStarted }: { onStarted: () => void }) {
             unit="s"
             value={before}
             onChange={setBefore}
+            onWrong={wrong.of('before')}
             min={0}
             max={60}
           />
@@ -145,6 +149,7 @@ export function RecordForm({ onStarted }: { onStarted: () => void }) {
           unit="s"
           value={seconds}
           onChange={setSeconds}
+          onWrong={wrong.of('seconds')}
           optional
           above={0}
           max={604800}
@@ -152,7 +157,7 @@ export function RecordForm({ onStarted }: { onStarted: () => void }) {
         <Button
           variant="filled"
           loading={act.busy}
-          disabled={channels.length === 0 || (edge && level === null)}
+          disabled={channels.length === 0 || wrong.any || (edge && level === null)}
           onClick={() => void start()}
         >
           {t(kind === 'none' ? 'recordings.start' : 'recordings.arm')}

@@ -6,6 +6,7 @@ import { useT } from '../../i18n'
 import { NumberField } from '../../widgets/NumberField'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 import { size } from './viewer'
 
 const GIGA = 1e9
@@ -23,6 +24,7 @@ export function RetentionPanel({
   const { max_total_bytes: most, keep_days: days } = list.retention
   const [total, setTotal] = useState<number | null>(most === null ? null : most / GIGA)
   const [age, setAge] = useState<number | null>(days)
+  const wrong = useWrong()
   const low = list.free_bytes < 2 * list.reserve_bytes
   return (
     <details className="retention">
@@ -40,6 +42,7 @@ export function RetentionPanel({
           unit="GB"
           value={total}
           onChange={setTotal}
+          onWrong={wrong.of('total')}
           optional
           min={0.001}
         />
@@ -47,11 +50,13 @@ export function RetentionPanel({
           label={t('recordings.days')}
           value={age}
           onChange={setAge}
+          onWrong={wrong.of('age')}
           optional
           above={0}
         />
         <Button
           loading={act.busy}
+          disabled={wrong.any}
           onClick={() =>
             void act
               .run(() =>

@@ -1,7 +1,7 @@
 import { Button, Modal, SegmentedControl } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
-import type { GearPlanInfo, GearWritten } from '../../api/schema'
+import type { GearPlanInfo, GearWritten, Mechanics } from '../../api/schema'
 import { known, useT } from '../../i18n'
 import { figure } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
@@ -20,33 +20,35 @@ import { useMechanics } from './useMechanics'
 export function GearPanel({ drive }: { drive: string }) {
   const t = useT()
   const { kept, form, change: retype, mechanics, keep, act } = useMechanics(drive)
-  const [plan, setPlan] = useState<GearPlanInfo | null>(null)
+  const [made, setMade] = useState<{ plan: GearPlanInfo; of: Mechanics } | null>(null)
   const [asked, setAsked] = useState(false)
   const [written, setWritten] = useState<GearWritten | null>(null)
+  // The form may have become another one since: by typing, or by what somebody else has kept.
+  const current = made !== null && JSON.stringify(made.of) === JSON.stringify(mechanics)
+  const plan = current || written ? (made?.plan ?? null) : null
   const change = (part: Partial<Form>) => {
     retype(part)
-    setPlan(null)
+    setMade(null)
     setWritten(null)
   }
   const calculate = () =>
     act.run(async () => {
       if (!mechanics) return
-      setPlan(
-        await ask(
-          api.POST('/api/v1/drives/{drive_id}/gear/plan', {
-            params: { path: { drive_id: drive } },
-            body: mechanics,
-          }),
-        ),
+      const found = await ask(
+        api.POST('/api/v1/drives/{drive_id}/gear/plan', {
+          params: { path: { drive_id: drive } },
+          body: mechanics,
+        }),
       )
+      setMade({ plan: found, of: mechanics })
     })
   const write = () =>
     act.run(async () => {
-      if (!mechanics) return
+      if (!made || !current) return
       const done = await ask(
         api.POST('/api/v1/drives/{drive_id}/gear/write', {
           params: { path: { drive_id: drive } },
-          body: mechanics,
+          body: made.of,
         }),
       )
       setWritten(done)
@@ -89,7 +91,7 @@ export function GearPanel({ drive }: { drive: string }) {
         <ProblemNote problem={act.problem} onClose={act.clear} />
       </Panel>
       {plan && (
-        <PlanPanel drive={drive} plan={plan} busy={act.busy} onWrite={() => setAsked(true)}>
+        <PlanPanel drive={drive} plan={plan} busy={act.busy} onWrite={() => setAsked(current)}>
           {written && (
             <Written
               drive={drive}
@@ -102,11 +104,11 @@ export function GearPanel({ drive }: { drive: string }) {
           )}
         </PlanPanel>
       )}
-      {asked && (
+      {asked && current && (
         <Modal opened onClose={() => setAsked(false)} title={t('gear.write')}>
           <p className="note warn">{t('gear.confirm')}</p>
-          {plan && plan.counted.length > 0 && (
-            <p>{t('gear.counted', { keys: plan.counted.join(', ') })}</p>
+          {made.plan.counted.length > 0 && (
+            <p>{t('gear.counted', { keys: made.plan.counted.join(', ') })}</p>
           )}
           <div className="row end">
             <Button onClick={() => setAsked(false)}>{t('cancel')}</Button>

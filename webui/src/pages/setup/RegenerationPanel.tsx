@@ -1,5 +1,5 @@
 import { Button, NativeSelect } from '@mantine/core'
-import { useEffect, useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { BrakingInfo, Regeneration, ResistorModel } from '../../api/schema'
 import { type T, useT } from '../../i18n'
@@ -11,6 +11,7 @@ import { ParameterFields } from '../../widgets/ParameterFields'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 import { useRemembered } from '../motion/remembered'
 import { useGains } from '../response/useGains'
 
@@ -41,6 +42,7 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
   const [voltage, setVoltage] = useState<number | null>(null)
   const [result, setResult] = useState<BrakingInfo | null>(null)
   const act = useAction()
+  const wrong = useWrong()
   useEffect(() => setLimits(model), [name])
   useEffect(() => {
     const known = gains?.inertia_kgm2
@@ -50,31 +52,36 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
     if (typeof threshold === 'number' && threshold > 0) setVoltage((old) => old ?? threshold)
   }, [threshold])
   const inputs = [inertia, speed, time, cycle, stops, fall, limits, voltage]
-  useEffect(() => setResult(null), inputs)
+  /** Counts the changes of the form: an answer to what stood there before is dropped. */
+  const changes = useRef(0)
+  useEffect(() => {
+    changes.current++
+    setResult(null)
+  }, inputs)
   const calculate = () =>
     act.run(async () => {
       if (inertia === null || speed === null || time === null || cycle === null) return
-      setResult(
-        await ask(
-          api.POST('/api/v1/calculate/braking', {
-            body: {
-              inertia_kgm2: inertia,
-              speed_rpm: speed,
-              deceleration_s: time,
-              cycle_s: cycle,
-              stops_per_cycle: stops ?? 2,
-              efficiency: 1,
-              fall_energy_j: fall ?? 0,
-              capacitor_j: limits.capacitor_j ?? 0,
-              built_in_ohm: limits.resistance_ohm ?? null,
-              built_in_w: limits.power_w ?? null,
-              min_external_ohm: limits.min_external_ohm ?? null,
-              max_external_w: limits.max_external_w ?? null,
-              on_voltage_v: voltage,
-            },
-          }),
-        ),
+      const asked = changes.current
+      const found = await ask(
+        api.POST('/api/v1/calculate/braking', {
+          body: {
+            inertia_kgm2: inertia,
+            speed_rpm: speed,
+            deceleration_s: time,
+            cycle_s: cycle,
+            stops_per_cycle: stops ?? 2,
+            efficiency: 1,
+            fall_energy_j: fall ?? 0,
+            capacitor_j: limits.capacitor_j ?? 0,
+            built_in_ohm: limits.resistance_ohm ?? null,
+            built_in_w: limits.power_w ?? null,
+            min_external_ohm: limits.min_external_ohm ?? null,
+            max_external_w: limits.max_external_w ?? null,
+            on_voltage_v: voltage,
+          },
+        }),
       )
+      if (asked === changes.current) setResult(found)
     })
   const limit = (key: Exclude<keyof ResistorModel, 'model'>, label: string, unit: string) => (
     <NumberField
@@ -82,6 +89,7 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
       unit={unit}
       value={limits[key] ?? null}
       onChange={(value) => setLimits({ ...limits, [key]: value })}
+      onWrong={wrong.of(key)}
       min={0}
       optional
     />
@@ -138,13 +146,14 @@ export function RegenerationPanel({ drive, regen }: { drive: string; regen: Rege
             unit="V"
             value={voltage}
             onChange={setVoltage}
+            onWrong={wrong.of('voltage')}
             above={0}
             optional
           />
         </div>
         <Button
           variant="filled"
-          disabled={[inertia, speed, time, cycle, stops, fall].includes(null)}
+          disabled={wrong.any || [inertia, speed, time, cycle, stops, fall].includes(null)}
           loading={act.busy}
           onClick={() => void calculate()}
         >

@@ -32,6 +32,9 @@ export function StationPanel({ url, station }: { url: string; station: SegmentSt
             : `${station.clock_ahead_ns} ns`,
     ],
   ]
+  // Files and consents are of this slave, also where another one is found at its place.
+  const { vendor_id, product_code, serial } = station
+  const slave = [station.station, station.drive, vendor_id, product_code, serial].join(' ')
   return (
     <div className="station">
       <h3>{`${station.station} · ${station.name}`}</h3>
@@ -80,9 +83,11 @@ export function StationPanel({ url, station }: { url: string; station: SegmentSt
           <Said message={station.note_messages[place]} words={note} />
         </p>
       ))}
-      <Alias key={station.station} url={url} station={station} />
-      <Eeprom key={`eeprom ${station.station}`} url={url} station={station} />
-      {station.foe && station.drive !== null && <Firmware drive={station.drive} />}
+      <Alias key={`alias ${slave}`} url={url} station={station} />
+      <Eeprom key={`eeprom ${slave}`} url={url} station={station} />
+      {station.foe && station.drive !== null && (
+        <Firmware key={`firmware ${slave}`} drive={station.drive} />
+      )}
     </div>
   )
 }

@@ -1,0 +1,72 @@
+import { answers, posted, requests } from '../testing/browser'
+import { afterEach, beforeEach, expect, it, vi } from 'vitest'
+import type { StopResult } from '../api/schema'
+import { contents, publish, setLink } from '../live/store'
+import { currentReport, dismissReport, listenForAnswers, stopEverything } from './stop'
+
+const RESULT = { stopped: ['x'], failed: {}, axes: [] } as unknown as StopResult
+/** A network that swallows everything: neither an answer nor an error. */
+const swallowed = () => new Promise(() => {})
+const link = (open: boolean) => setLink({ open, attempt: open ? 0 : 1, roundTripMs: null }, 0)
+
+listenForAnswers()
+beforeEach(() => {
+  vi.useFakeTimers()
+  answers.splice(0)
+  requests.splice(0)
+  posted.splice(0)
+  dismissReport()
+  link(true)
+})
+afterEach(() => vi.useRealTimers())
+
+it('goes both ways, and states what it reached', async () => {
+  answers.push({ method: 'POST', path: /\/stop$/, give: () => RESULT })
+  await stopEverything()
+  expect(posted).toContainEqual({ kind: 'send', message: { type: 'stop', drive: null } })
+  expect(currentReport()).toMatchObject({ answer: RESULT, failure: null })
+})
+
+it('sends to the emergency stop when nothing says that it has gone out', () => {
+  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  void stopEverything()
+  vi.advanceTimersByTime(1000)
+  expect(currentReport()?.failure).toBeNull()
+  vi.advanceTimersByTime(3000)
+  expect(currentReport()?.failure).toBe('unknown')
+})
+
+it('takes that back when the server says that it has gone out after all', () => {
+  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  void stopEverything()
+  vi.advanceTimersByTime(4000)
+  publish('stopTaken')
+  expect(currentReport()).toMatchObject({ failure: null, taken: true })
+})
+
+it('sends to the emergency stop when the connection goes before the axes are seen to stand', () => {
+  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  void stopEverything()
+  publish('stopTaken')
+  vi.advanceTimersByTime(500)
+  expect(currentReport()?.failure).toBeNull()
+  link(false)
+  expect(currentReport()?.failure).toBe('unknown')
+  // The verdicts may still come by the next connection's time.
+  contents.stopReached = { at: 0, result: RESULT }
+  publish('stopReached')
+  expect(currentReport()).toMatchObject({ answer: RESULT, failure: null })
+})
+
+it('does not report on a STOP that was answered or put away', async () => {
+  answers.push({ method: 'POST', path: /\/stop$/, give: () => RESULT })
+  await stopEverything()
+  vi.advanceTimersByTime(10_000)
+  link(false)
+  expect(currentReport()?.failure).toBeNull()
+  answers.splice(0, 1, { method: 'POST', path: /\/stop$/, give: swallowed })
+  void stopEverything()
+  dismissReport()
+  vi.advanceTimersByTime(10_000)
+  expect(currentReport()).toBeNull()
+})
