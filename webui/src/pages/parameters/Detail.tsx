@@ -166,12 +166,15 @@ export function Editor({
   const reading = useReading(drive, row.key) ?? row.reading
   const edit = useEdits(drive).edits.get(row.key)
   const [typing, setTyping] = useState<string | null>(null)
-  const [asRaw, setAsRaw] = useState(edit?.asRaw ?? false)
+  const [choice, setChoice] = useState(false)
+  // An edit of the table or of a comparison keeps its own scale.
+  const asRaw = edit?.asRaw ?? choice
   const current = edit?.text ?? editText(row, reading, asRaw)
   const text = typing ?? current
   const typed = parseTyped(row, text, asRaw)
   const keep = (next: string, raw: boolean) => {
     const same = next === editText(row, reading, raw)
+    setChoice(raw)
     setEdit(drive, row.key, same ? null : { text: next, asRaw: raw })
   }
   const fields = bitFields(row)
@@ -217,7 +220,7 @@ export function Editor({
           label={t('parameters.typeRaw')}
           checked={asRaw}
           onChange={(event) => {
-            setAsRaw(event.currentTarget.checked)
+            setChoice(event.currentTarget.checked)
             setTyping(null)
             setEdit(drive, row.key, null)
           }}
@@ -233,7 +236,6 @@ export function Editor({
               raw={raw}
               onChange={(value) => {
                 setTyping(null)
-                setAsRaw(true)
                 keep(String(setField(raw, field, value, row.type)), true)
               }}
             />

@@ -10,7 +10,7 @@ import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
-import { setEdit, useEdits, writeEdits } from './edits'
+import { setEdit, setProblem, useEdits, writeEdits } from './edits'
 import { GridRow } from './GridRow'
 
 const FINE_ROW = 36
@@ -106,7 +106,9 @@ export function Grid({
       moveTo(target)
     } else if (row && event.key === 'Enter' && (event.ctrlKey || event.metaKey)) {
       event.preventDefault()
-      void writeEdits(drive, [row.key])
+      void writeEdits(drive, [row.key]).then(
+        (problem) => problem && setProblem(drive, row.key, problem),
+      )
     } else if (row && (event.key === 'Enter' || event.key === 'F2')) {
       event.preventDefault()
       if (editable(row)) beginEdit(row.key, null)

@@ -7,7 +7,7 @@ import { Icon } from '../../widgets/Icon'
 import { parseTyped } from '../../widgets/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
-import { type Edit, setEdit, toggleFavourite, useFavourites } from './edits'
+import { type Edit, setEdit, textAs, toggleFavourite, useFavourites } from './edits'
 import { editable } from './Grid'
 
 interface Props {
@@ -121,6 +121,7 @@ function ValueCell({ row, edit, asRaw, reading, onBegin }: Props & { reading: Pa
   const t = useT()
   const say = useSay()
   const text = readingText(row, reading, asRaw)
+  const edited = edit && textAs(row, edit, asRaw)
   if (!editable(row))
     return (
       <span title={say.message(row.unreachable_why_message, row.unreachable_why) || text}>
@@ -133,14 +134,14 @@ function ValueCell({ row, edit, asRaw, reading, onBegin }: Props & { reading: Pa
       tabIndex={-1}
       className="value-button"
       // With what is on it: voice control presses a button by its visible words.
-      aria-label={`${t('parameters.edit', { name: row.name })}: ${edit ? `${text} ${edit.text}` : text}`}
+      aria-label={`${t('parameters.edit', { name: row.name })}: ${edit ? `${text} ${edited}` : text}`}
       onClick={(event) => {
         if (event.detail === 1) onBegin(row.key, null)
       }}
     >
       {edit ? (
-        <span className="change" title={`${text} → ${edit.text}`}>
-          <s className="dim">{text}</s> <span className="typed">{edit.text}</span>
+        <span className="change" title={`${text} → ${edited}`}>
+          <s className="dim">{text}</s> <span className="typed">{edited}</span>
         </span>
       ) : (
         text
@@ -159,12 +160,17 @@ function ValueEditor({
   onEnd,
 }: Props & { reading: ParameterValue; begun: string | null }) {
   const t = useT()
-  const start = edit?.text ?? editText(row, reading, asRaw)
-  const [text, setText] = useState(begun ?? start)
+  const start = () => (edit ? textAs(row, edit, asRaw) : editText(row, reading, asRaw))
+  const [text, setText] = useState(() => begun ?? start())
+  const [typed, setTyped] = useState(begun !== null)
   const input = useRef<HTMLInputElement & HTMLSelectElement>(null)
   const ended = useRef(false)
   const enums = Object.entries(row.enum)
-  const typed = parseTyped(row, text, asRaw)
+  const meant = parseTyped(row, text, asRaw)
+  const change = (next: string) => {
+    setText(next)
+    setTyped(true)
+  }
   useEffect(() => {
     const element = input.current
     element?.focus()
@@ -173,7 +179,8 @@ function ValueEditor({
   const finish = (keep: boolean, value = text) => {
     if (ended.current) return
     ended.current = true
-    if (keep) {
+    // What nobody typed is no edit, although the drive may have another value by now.
+    if (keep && typed) {
       const unchanged = value === editText(row, reading, asRaw)
       setEdit(drive, row.key, unchanged ? null : { text: value, asRaw })
     }
@@ -181,7 +188,7 @@ function ValueEditor({
   }
   const keys = (event: React.KeyboardEvent) => {
     event.stopPropagation()
-    if (event.key === 'Enter' && typed.ok) finish(true)
+    if (event.key === 'Enter' && meant.ok) finish(true)
     else if (event.key === 'Escape') finish(false)
   }
   if (enums.length > 0) {
@@ -191,7 +198,7 @@ function ValueEditor({
         className="cell-editor"
         aria-label={row.name}
         value={text}
-        onChange={(event) => setText(event.currentTarget.value)}
+        onChange={(event) => change(event.currentTarget.value)}
         onKeyDown={keys}
         onBlur={() => finish(true)}
       >
@@ -210,17 +217,17 @@ function ValueEditor({
         ref={input}
         className="cell-editor num"
         aria-label={row.name}
-        aria-invalid={!typed.ok}
+        aria-invalid={!meant.ok}
         inputMode={row.type === 'STRING' || row.type === 'OCTETS' ? 'text' : 'decimal'}
         value={text}
-        onChange={(event) => setText(event.currentTarget.value)}
+        onChange={(event) => change(event.currentTarget.value)}
         onKeyDown={keys}
         // An invalid text is not kept: it could never be written.
-        onBlur={() => finish(typed.ok)}
+        onBlur={() => finish(meant.ok)}
       />
-      {!typed.ok && (
+      {!meant.ok && (
         <span className="editor-problem" role="alert">
-          {t(`typed.${typed.why}`, { limit: typed.limit ?? '' })}
+          {t(`typed.${meant.why}`, { limit: meant.limit ?? '' })}
         </span>
       )}
     </span>

@@ -1,6 +1,7 @@
 import { api, ask, problemOf } from '../../api/client'
 import type { Problem, WriteResult } from '../../api/schema'
 import { contents, publish, setReadings, useStore } from '../../live/store'
+import { toValue } from '../../widgets/format'
 import { parseTyped } from '../../widgets/parse'
 import type { ParameterInfo } from '../../widgets/types'
 
@@ -45,6 +46,19 @@ export function setEdit(drive: string, key: string, edit: Edit | null): void {
   change(drive, { edits, problems })
 }
 
+/** The text of an edit, raw or in the unit, whichever it was typed as. */
+export function textAs(row: ParameterInfo, edit: Edit, asRaw: boolean): string {
+  const typed = parseTyped(row, edit.text, edit.asRaw)
+  if (edit.asRaw === asRaw || Object.keys(row.enum).length > 0 || !typed.ok) return edit.text
+  if (typed.value !== undefined) return String((typed.value - row.offset) / row.scale)
+  return String(asRaw ? typed.raw : toValue(row, typed.raw ?? ''))
+}
+
+/** Mark an edited value with the reason why it was not written. */
+export function setProblem(drive: string, key: string, problem: Problem): void {
+  change(drive, { problems: new Map(get(drive).problems).set(key, problem) })
+}
+
 export function discardEdits(drive: string): void {
   change(drive, { edits: new Map(), problems: new Map() })
 }
@@ -55,8 +69,9 @@ export function setDiffers(drive: string, differs: ReadonlyMap<string, string>):
 }
 
 /**
- * Write edited values, each read back. A written one is no longer edited; a refused one stays
- * edited with the reason. Returns what failed as a whole, such as a lost connection.
+ * Write edited values, each read back. A written one is no longer edited, unless it was edited
+ * again meanwhile; a refused one stays edited with the reason. Returns what failed as a whole, such
+ * as a lost connection.
  */
 export async function writeEdits(drive: string, keys: string[]): Promise<Problem | null> {
   const rows = new Map(contents.rows.get(drive)?.map((row) => [row.key, row]))
@@ -81,7 +96,7 @@ export async function writeEdits(drive: string, keys: string[]): Promise<Problem
           body: { values },
         }),
       )
-      settle(drive, results)
+      settle(drive, results, new Map(chunk.map(({ key, edit }) => [key, edit])))
       done += chunk.length
     }
     return null
@@ -100,7 +115,7 @@ function toBody(
   return typed.ok ? { raw: typed.raw ?? null, value: typed.value ?? null } : null
 }
 
-function settle(drive: string, results: WriteResult[]): void {
+function settle(drive: string, results: WriteResult[], sent: ReadonlyMap<string, Edit>): void {
   setReadings(
     drive,
     results.map((result) => result.reading),
@@ -109,10 +124,11 @@ function settle(drive: string, results: WriteResult[]): void {
   const problems = new Map(get(drive).problems)
   const differs = new Map(get(drive).differs)
   for (const result of results) {
+    if (result.ok) differs.delete(result.key) // compared with the old value
+    if (edits.get(result.key) !== sent.get(result.key)) continue
     if (result.ok) {
       edits.delete(result.key)
       problems.delete(result.key)
-      differs.delete(result.key) // compared with the old value; a new comparison will show
     } else if (result.problem) problems.set(result.key, result.problem)
   }
   change(drive, { edits, problems, differs })

@@ -8,7 +8,7 @@ import { useBuses } from '../../live/buses'
 import { useLimits } from '../response/limits'
 import { useMeasurable } from '../response/useMeasurable'
 import '../response/response.css'
-import { asAutotune, asInertia } from '../response/results'
+import { asAutotune } from '../response/results'
 import { useChanges } from '../response/undo'
 import { useGains } from '../response/useGains'
 import { useMeasurements } from '../response/useMeasurements'
@@ -32,6 +32,7 @@ import { SafetyPanel } from './tools/SafetyPanel'
 import { ShapingPanel } from './tools/ShapingPanel'
 import { ReportPanel, useReports } from './ReportPanel'
 import { DwellPanel, VibrationPanel } from './tools/VibrationPanel'
+import { newestInertia } from './autotune/newest'
 import { present, type Section, useSections } from './sections'
 import { StepPanel } from './StepPanel'
 import { checked, preChecks } from './steps'
@@ -96,7 +97,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
         : limits.agreed
           ? null
           : t('start.agree')
-  const found = asInertia(job('inertia')?.result) ?? tuned?.inertia ?? null
+  const found = newestInertia(job('inertia'), tuneJob)
   const si = found?.identifiable && found.unit === 'SI' ? found.inertia_kgm2 : null
   const designable = gains.gains !== null && gains.gains.convention !== 'unit'
   const ours = measured.list.filter(
@@ -209,6 +210,7 @@ function TunePath({ drive, summary }: { drive: string; summary: DriveSummary }) 
                 {designable && gains.gains && (
                   <CandidatesPanel
                     drive={drive}
+                    name={summary.name}
                     list={mechanics}
                     gains={gains.gains}
                     inertia={si}

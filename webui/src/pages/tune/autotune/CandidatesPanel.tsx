@@ -13,20 +13,34 @@ import { fixed, hertz } from '../../response/bode'
 import type { Candidate } from '../../response/results'
 import { remember } from '../../response/undo'
 import { CandidateTable } from './CandidateTable'
+import { amount } from '../steps'
 
 /** What the server answers when a manual documents no notch. */
 const NONE_DOCUMENTED = 'urn:servodeck:not-allowed'
 const LOADS = ['auto', 'stiff', 'medium', 'compliant'] as const
 
+/** Designs, and what they were computed of: their gains hold for no other inertia. */
+interface Designs {
+  load: string
+  rows: Candidate[]
+  file: string
+  inertia: number
+  wanted: (typeof LOADS)[number]
+}
+
 /** Gains and notches computed from a stored response; one of them can be written. */
 export function CandidatesPanel({
   drive,
+  name,
   list,
   gains,
   inertia,
   onApplied,
 }: {
   drive: string
+  /** Name of the axis, as its measurements have it. */
+  name: string
+  /** Responses of this axis, and of others of its family. */
   list: MeasurementInfo[]
   gains: GainInfo
   inertia: number | null
@@ -36,8 +50,8 @@ export function CandidatesPanel({
   const [chosen, setChosen] = useState('')
   const [load, setLoad] = useState<(typeof LOADS)[number]>('auto')
   const [total, setTotal] = useState<number | null>(null)
-  const [found, setFound] = useState<{ load: string; rows: Candidate[] } | null>(null)
-  const [asked, setAsked] = useState<Candidate | null>(null)
+  const [found, setFound] = useState<Designs | null>(null)
+  const [asked, setAsked] = useState<{ candidate: Candidate; inertia: number } | null>(null)
   const [written, setWritten] = useState(false)
   const design = useAction()
   const write = useAction()
@@ -45,7 +59,10 @@ export function CandidatesPanel({
   useEffect(() => {
     if (total_ !== null) setTotal(Number(total_.toPrecision(4)))
   }, [total_])
-  const file = chosen || (list[0]?.file ?? '')
+  // Another machine is measured only where a person chooses that.
+  const file = chosen || (list.find((each) => each.drive === name)?.file ?? '')
+  const designs =
+    found?.file === file && found.inertia === total && found.wanted === load ? found : null
   const go = () =>
     design.run(async () => {
       if (total === null) return
@@ -60,12 +77,13 @@ export function CandidatesPanel({
           body,
         }),
       )
-      setFound({ load: answer.load, rows: answer.candidates })
+      const { load: judged, candidates: rows } = answer
+      setFound({ load: judged, rows, file, inertia: total, wanted: load })
       setWritten(false)
     })
-  const apply = (candidate: Candidate) =>
+  const apply = (candidate: Candidate, inertia_kgm2: number) =>
     write.run(async () => {
-      if (total === null) return
+      setWritten(false)
       // Asked first: a family without notches has nothing to write, any other failure ends it here.
       const hasNotches = await documentsNotches(drive)
       const path = { params: { path: { drive_id: drive } } }
@@ -73,7 +91,7 @@ export function CandidatesPanel({
       const gains = await ask(
         api.PUT('/api/v1/drives/{drive_id}/gains', {
           ...path,
-          body: { gains: { speed_bandwidth_hz, integral_hz, position_1_s, inertia_kgm2: total } },
+          body: { gains: { speed_bandwidth_hz, integral_hz, position_1_s, inertia_kgm2 } },
         }),
       )
       // Kept at once: the way back must be there even when the notches are refused.
@@ -104,10 +122,13 @@ export function CandidatesPanel({
               label={t('candidate.from')}
               value={file}
               onChange={(event) => setChosen(event.currentTarget.value)}
-              data={list.map((each) => ({
-                value: each.file,
-                label: `${each.drive} · ${dateTime(each.saved)}`,
-              }))}
+              data={[
+                ...(file === '' ? [{ value: '', label: '—' }] : []),
+                ...list.map((each) => ({
+                  value: each.file,
+                  label: `${each.drive} · ${dateTime(each.saved)}`,
+                })),
+              ]}
             />
             <NumberField
               label={t('gain.inertia')}
@@ -134,10 +155,15 @@ export function CandidatesPanel({
         </>
       )}
       <ProblemNote problem={design.problem} onClose={design.clear} />
-      {found && (
+      {designs && (
         <>
-          <p>{t('candidate.as', { load: known(t, 'load', found.load) })}</p>
-          <CandidateTable candidates={found.rows} onApply={write.busy ? null : setAsked} />
+          <p>{t('candidate.as', { load: known(t, 'load', designs.load) })}</p>
+          <CandidateTable
+            candidates={designs.rows}
+            onApply={
+              write.busy ? null : (candidate) => setAsked({ candidate, inertia: designs.inertia })
+            }
+          />
         </>
       )}
       <ProblemNote problem={write.problem} onClose={write.clear} />
@@ -151,15 +177,18 @@ export function CandidatesPanel({
           <p>{t('notch.confirm')}</p>
           <ul className="num">
             <li>
-              {t('gain.speed')}: {hertz(asked.gains.speed_bandwidth_hz)}
+              {t('gain.speed')}: {hertz(asked.candidate.gains.speed_bandwidth_hz)}
             </li>
             <li>
-              {t('gain.integral')}: {hertz(asked.gains.integral_hz)}
+              {t('gain.integral')}: {hertz(asked.candidate.gains.integral_hz)}
             </li>
             <li>
-              {t('gain.position')}: {fixed(asked.gains.position_1_s, 1, '1/s')}
+              {t('gain.position')}: {fixed(asked.candidate.gains.position_1_s, 1, '1/s')}
             </li>
-            {asked.notches.map((notch, i) => (
+            <li>
+              {t('gain.inertia')}: {amount(asked.inertia, 'kg·m²')}
+            </li>
+            {asked.candidate.notches.map((notch, i) => (
               <li key={i}>
                 {t('notch.slot', { number: i + 1 })}:{' '}
                 {`${hertz(notch.center_hz)} · ${hertz(notch.width_hz)} · ${fixed(notch.depth_db, 1, 'dB')}`}
@@ -172,7 +201,7 @@ export function CandidatesPanel({
               variant="filled"
               onClick={() => {
                 setAsked(null)
-                void apply(asked)
+                void apply(asked.candidate, asked.inertia)
               }}
             >
               {t('notch.writeNow')}
