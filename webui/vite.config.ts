@@ -38,5 +38,5 @@ export default defineConfig({
       '/rerun': { target: process.env.SERVODECK_SERVER ?? 'http://127.0.0.1:8000', ws: true },
     },
   },
-  test: { environment: 'node', include: ['src/**/*.test.ts'] },
+  test: { environment: 'node', include: ['src/**/*.test.{ts,tsx}'] },
 })
