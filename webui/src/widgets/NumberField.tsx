@@ -8,6 +8,7 @@ export function NumberField({
   unit,
   value,
   onChange,
+  onInvalid,
   min,
   max,
   above,
@@ -21,6 +22,8 @@ export function NumberField({
   unit?: string
   value: number | null
   onChange: (value: number | null) => void
+  /** Instead of `onChange`, for a text that is no valid number. Null is then an empty field only. */
+  onInvalid?: () => void
   min?: number
   max?: number
   /** Exclusive lower limit. */
@@ -36,7 +39,8 @@ export function NumberField({
   const [text, setText] = useState(value === null ? '' : String(value))
   useEffect(() => {
     // A value set from elsewhere replaces the text; one's own typing is left as typed.
-    setText((typed) => (value !== null && toNumber(typed) !== value ? String(value) : typed))
+    const set = value !== null && !Number.isNaN(value)
+    setText((typed) => (set && toNumber(typed) !== value ? String(value) : typed))
   }, [value])
   // An empty form is not a mistake yet; a field that was emptied or left empty is.
   const [touched, setTouched] = useState(false)
@@ -74,7 +78,9 @@ export function NumberField({
         setTouched(true)
         setText(event.currentTarget.value)
         const next = toNumber(event.currentTarget.value)
-        onChange(valid(next) ? next : null)
+        const wrong = event.currentTarget.value.trim() !== '' && !valid(next)
+        if (wrong && onInvalid) onInvalid()
+        else onChange(valid(next) ? next : null)
       }}
     />
   )

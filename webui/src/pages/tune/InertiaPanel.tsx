@@ -49,6 +49,7 @@ export function InertiaPanel({
   const result = asInertia(job?.result)
   const complete =
     limits !== null &&
+    !Number.isNaN(motor) &&
     repetitions !== null &&
     scheme.complete &&
     searchTorque !== null &&
@@ -111,6 +112,7 @@ export function InertiaPanel({
           unit="kg·m²"
           value={motor}
           onChange={setMotor}
+          onInvalid={() => setMotor(Number.NaN)}
           above={0}
           optional
           help={t('inertia.motorHelp')}
