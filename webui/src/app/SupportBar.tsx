@@ -37,7 +37,11 @@ function Granted({ invitation }: { invitation: InvitationView }) {
   const drives = useDrives() ?? []
   const { grant } = invitation
   if (!grant) return <>{t('support.looks')}</>
-  const axis = drives.find((each) => each.id === grant.drive)?.name ?? t('support.allAxes')
+  // An axis that is not connected now is still the only one.
+  const axis =
+    grant.drive === null
+      ? t('support.allAxes')
+      : (drives.find((each) => each.id === grant.drive)?.name ?? grant.drive)
   return (
     <>
       {t('support.granted', {

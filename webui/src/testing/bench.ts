@@ -20,6 +20,15 @@ let server: Server = () => 404
 /** Everything that the page asked for, in order. */
 export const asked: Asked[] = []
 
+/** A refusal of the server. */
+export const refusal = (status: number, part: object = {}) => ({
+  type: 'urn:servodeck:not-allowed',
+  title: '',
+  status,
+  detail: `refused with ${status}`,
+  ...part,
+})
+
 /** Answer the page's requests from now on; a number is the status of a refusal. */
 export function serve(next: Server): void {
   server = next
@@ -46,20 +55,15 @@ async function answered(request: Request): Promise<Response> {
   const text = await request.text()
   const one = {
     method: request.method,
-    path: `${url.pathname.replace('/api/v1', '')}${url.search}`,
+    path: `${url.pathname.replace('/station/api/v1', '')}${url.search}`,
     body: text === '' ? null : (JSON.parse(text) as unknown),
   }
   asked.push(one)
   const found = await server(one)
   const headers = { 'Content-Type': 'application/json' }
-  if (typeof found === 'number') {
-    const problem = {
-      type: 'urn:servodeck:not-allowed',
-      title: '',
-      status: found,
-      detail: `refused with ${found}`,
-    }
-    return new Response(JSON.stringify(problem), { status: found, headers })
+  const problem = typeof found === 'number' ? refusal(found) : found
+  if (problem && 'status' in problem && typeof problem.status === 'number') {
+    return new Response(JSON.stringify(problem), { status: problem.status, headers })
   }
   return new Response(JSON.stringify(found), { headers })
 }
@@ -81,12 +85,16 @@ Object.assign(globalThis, {
   localStorage: kept(),
   sessionStorage: kept(),
   HTMLInputElement: Object,
+  Worker: class {
+    postMessage = nothing
+  },
   ResizeObserver: class {
     observe = nothing
     disconnect = nothing
   },
   document: {
-    baseURI: `${ORIGIN}/`,
+    // Behind a proxy's path, where an address without it leads nowhere.
+    baseURI: `${ORIGIN}/station/`,
     documentElement: element(),
     createElement: element,
     getElementById: () => null,

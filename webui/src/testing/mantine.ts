@@ -7,7 +7,10 @@ const bare = (name: string) => (props: Record<string, unknown> & { children?: Re
 export const ActionIcon = bare('ActionIcon')
 export const Button = bare('Button')
 export const Checkbox = Object.assign(bare('Checkbox'), { Group: bare('Checkbox.Group') })
-export const FileButton = bare('FileButton')
+export const FileButton = (props: {
+  onChange: (file: File | null) => void
+  children: (props: object) => ReactNode
+}) => createElement('FileButton', { onChange: props.onChange } as object, props.children({}))
 export const FileInput = bare('FileInput')
 export const Modal = bare('Modal')
 export const NativeSelect = bare('NativeSelect')

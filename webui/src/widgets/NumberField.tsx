@@ -10,6 +10,7 @@ export function NumberField({
   value,
   onChange,
   onWrong,
+  onInvalid,
   min,
   max,
   above,
@@ -25,6 +26,8 @@ export function NumberField({
   onChange: (value: number | null) => void
   /** Whether it holds something that is not allowed, and not just nothing. */
   onWrong?: (wrong: boolean) => void
+  /** Instead of `onChange`, for a text that is no valid number. Null is then an empty field only. */
+  onInvalid?: () => void
   min?: number
   max?: number
   /** Exclusive lower limit. */
@@ -42,7 +45,7 @@ export function NumberField({
   tell.current = onWrong
   useEffect(() => {
     // A value set from elsewhere replaces the text; one's own typing is left as typed.
-    if (value === null || toNumber(text) === value) return
+    if (value === null || Number.isNaN(value) || toNumber(text) === value) return
     setText(String(value))
     tell.current?.(false)
   }, [value])
@@ -77,7 +80,8 @@ export function NumberField({
         setText(event.currentTarget.value)
         const next = event.currentTarget.value
         const wrong = next.trim() !== '' && faultOf(next, bounds) !== null
-        onChange(wrong ? null : toNumber(next))
+        if (wrong && onInvalid) onInvalid()
+        else onChange(wrong ? null : toNumber(next))
         onWrong?.(wrong)
       }}
     />

@@ -56,7 +56,8 @@ export function ParameterFields({
 }: {
   drive: string
   keys: readonly string[]
-  onWritten?: (before: Record<string, number>) => void
+  /** Raw values that were changed, as they were before, and as they were read back. */
+  onWritten?: (before: Record<string, number>, after: Record<string, number>) => void
 }) {
   const t = useT()
   const { open } = useLink()
@@ -80,7 +81,8 @@ export function ParameterFields({
       const changed = Object.fromEntries(
         Object.entries(before).filter(([key, raw]) => now[key] !== raw),
       )
-      if (Object.keys(changed).length > 0) onWritten?.(changed)
+      const after = Object.entries(now).filter(([key]) => key in changed)
+      if (Object.keys(changed).length > 0) onWritten?.(changed, Object.fromEntries(after))
     })
   if (rows.length === 0) {
     return <p className="dim">{t('fields.none')}</p>

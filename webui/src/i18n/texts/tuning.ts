@@ -83,6 +83,14 @@ export const tuning = {
     '{count} 次，共 {duration}；{from} 至 {to} 共 {lines} 条谱线；峰值 {peak} {unit}，峰值因数 {crest}。开始前会按实测轴特性再次缩放，绝不超过限制。',
   ],
   'sweep.start': ['Start measuring', '开始测量'],
+  'response.otherUnit': [
+    'The compared response is in {unit}, this one in {shown}: it is not drawn over it.',
+    '对比响应的单位为 {unit}，当前响应的单位为 {shown}，因此不叠加显示。',
+  ],
+  'predict.otherAxis': [
+    'This response is of another axis: the loop of this axis is not predicted from it.',
+    '此响应来自另一个轴，因此不据此预测本轴的环路。',
+  ],
   'response.empty': [
     'No response is shown. Measure one, or choose a stored one.',
     '尚未显示响应。请测量，或选择已存储的测量。',

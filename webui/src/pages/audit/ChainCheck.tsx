@@ -1,5 +1,5 @@
 import { Button, TextInput } from '@mantine/core'
-import { useState } from 'react'
+import { useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AuditVerdict } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
@@ -17,11 +17,14 @@ export function ChainCheck() {
   const [anchor, setAnchor] = useState('')
   const [verdict, setVerdict] = useState<AuditVerdict | null>(null)
   const good = ANCHOR.test(anchor.trim())
+  const present = useRef(anchor)
+  present.current = anchor
   const check = () =>
     act.run(async () => {
       setVerdict(null)
       const query = { anchor: anchor.trim() }
-      setVerdict(await ask(api.GET('/api/v1/audit/verify', { params: { query } })))
+      const found = await ask(api.GET('/api/v1/audit/verify', { params: { query } }))
+      if (present.current === anchor) setVerdict(found)
     })
   return (
     <Panel title={t('audit.check')}>
@@ -31,7 +34,11 @@ export function ChainCheck() {
           label={t('audit.anchor')}
           value={anchor}
           error={good ? null : t('audit.anchorBad')}
-          onChange={(event) => setAnchor(event.currentTarget.value)}
+          onChange={(event) => {
+            // A verdict is of the anchor that was checked.
+            setVerdict(null)
+            setAnchor(event.currentTarget.value)
+          }}
         />
         <Button loading={act.busy} disabled={!good} onClick={() => void check()}>
           {t('audit.check')}

@@ -16,13 +16,16 @@ export function useAudit(filters: AuditFilters) {
   const key = JSON.stringify(filters)
   const asked = useRef(key)
   asked.current = key
+  const turn = useRef(0)
   const load = useCallback(
     async (before: number | null) => {
+      const own = (turn.current += 1)
       const query = { ...auditQuery(JSON.parse(key) as AuditFilters), before }
       try {
         setStatus(await ask(api.GET('/api/v1/audit/status')))
         const page = await ask(api.GET('/api/v1/audit', { params: { query } }))
-        if (asked.current !== key) return // another filter was chosen meanwhile
+        // Another filter was chosen meanwhile, or the same entries were asked for again.
+        if (asked.current !== key || turn.current !== own) return
         setEvents((known) => (before === null ? page.events : [...(known ?? []), ...page.events]))
         setNext(page.next ?? null)
         if (before === null) setNames(await ask(api.GET('/api/v1/audit/names')))

@@ -1,5 +1,5 @@
 import { useCallback, useEffect, useState } from 'react'
-import { api, ask, problemOf } from '../../api/client'
+import { API_ROOT, api, ask, problemOf } from '../../api/client'
 import type { Problem, StoredSet } from '../../api/schema'
 import { useLink } from '../../live/store'
 
@@ -35,5 +35,5 @@ export function offerDownload(name: string, parts: BlobPart[], type: string): vo
 
 /** Where a set is to be had as a list for other tools. */
 export function listUrl(file: string, format: 'csv' | 'dcf'): string {
-  return `/api/v1/sets/${encodeURIComponent(file)}/list?format=${format}`
+  return `${API_ROOT}/api/v1/sets/${encodeURIComponent(file)}/list?format=${format}`
 }

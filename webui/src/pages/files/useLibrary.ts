@@ -1,4 +1,4 @@
-import { useCallback, useState } from 'react'
+import { useCallback, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { LibraryEntry, MessageInfo, Problem, TagCount } from '../../api/schema'
 import { useLink } from '../../live/store'
@@ -19,11 +19,17 @@ export function useLibrary(filters: Filters) {
   const [problem, setProblem] = useState<Problem | null>(null)
   const [limit, setLimit] = useState(PAGE)
   const key = JSON.stringify([filters, limit])
+  const present = useRef(key)
+  present.current = key
+  const turn = useRef(0)
   const refresh = useCallback(async () => {
+    const own = (turn.current += 1)
+    const overtaken = () => present.current !== key || turn.current !== own
     const [wanted, most] = JSON.parse(key) as [Filters, number]
     try {
       const query = queryOf(wanted, most)
       const page = await ask(api.GET('/api/v1/library', { params: { query } }))
+      if (overtaken()) return
       setEntries(page.entries)
       setTotal(page.total)
       setProblems(page.problems)
@@ -32,7 +38,7 @@ export function useLibrary(filters: Filters) {
       setTags(await ask(api.GET('/api/v1/library/tags')))
       setProblem(null)
     } catch (error) {
-      setProblem(problemOf(error))
+      if (!overtaken()) setProblem(problemOf(error))
     }
   }, [key])
   useSearch(refresh, open)

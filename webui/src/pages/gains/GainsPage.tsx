@@ -72,7 +72,7 @@ export function GainsPage({ drive }: { drive: string }) {
                   <ParameterFields
                     drive={drive}
                     keys={part.keys}
-                    onWritten={(before) => remember(drive, 'gains', { before })}
+                    onWritten={(before, after) => remember(drive, 'gains', { before, after })}
                   />
                 </div>
               ))}

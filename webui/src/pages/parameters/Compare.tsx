@@ -1,5 +1,5 @@
 import { Button, Checkbox, NativeSelect } from '@mantine/core'
-import { useEffect, useMemo, useState } from 'react'
+import { useEffect, useMemo, useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Diff, DiffRow, DriveSummary, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
@@ -26,6 +26,9 @@ export function Compare({ drive, rows }: { drive: DriveSummary; rows: ParameterR
   const [taken, setTaken] = useState(0)
   const isFile = source.startsWith('file:')
 
+  // What is compared with now: an answer to what was chosen before is dropped.
+  const present = useRef(source)
+  present.current = source
   const run = (from = source) =>
     compare.run(async () => {
       setTaken(0)
@@ -35,6 +38,7 @@ export function Compare({ drive, rows }: { drive: DriveSummary; rows: ParameterR
           params: { path: { drive_id: drive.id }, query },
         }),
       )
+      if (present.current !== from) return
       setDiff(found)
       setTicked(new Set(found.rows.filter((row) => row.selected).map((row) => row.key)))
       setDiffers(

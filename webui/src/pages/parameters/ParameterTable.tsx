@@ -140,7 +140,7 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ShownRow[] }) {
   const act = useAction()
   const jobs = useJobs()
   const [closed, setClosed] = useState<string | null>(null)
-  const [opened] = useState(() => Date.now())
+  const [old] = useState(() => endedOf(jobs))
   const job = newest(
     [...jobs.values()].filter((each) => each.drive === drive.id && each.kind === 'read_all'),
   )
@@ -209,7 +209,7 @@ function Actions({ drive, shown }: { drive: DriveSummary; shown: ShownRow[] }) {
           {t('parameters.refused', { count: problems.size })}
         </p>
       )}
-      {job && job.id !== closed && !isOld(job, opened) && (
+      {job && job.id !== closed && !old.has(job.id) && (
         <>
           <JobNote id={job.id} onClose={() => setClosed(job.id)} />
           <ReadFailures job={job} />
@@ -239,8 +239,9 @@ function ReadFailures({ job }: { job: JobInfo }) {
   )
 }
 
-/** A job that had ended before this page was opened is no news. */
-const isOld = (job: JobInfo, opened: number) => job.ended !== null && Date.parse(job.ended) < opened
+/** Jobs that had ended before this page was opened are no news; no clock says which they are. */
+const endedOf = (jobs: ReadonlyMap<string, JobInfo>): ReadonlySet<string> =>
+  new Set([...jobs.values()].filter((each) => each.ended !== null).map((each) => each.id))
 
 function newest(jobs: JobInfo[]): JobInfo | null {
   return jobs.reduce<JobInfo | null>(

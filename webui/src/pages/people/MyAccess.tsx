@@ -86,6 +86,7 @@ function ChangePassword() {
   const [done, setDone] = useState(false)
   const submit = (event: SyntheticEvent) => {
     event.preventDefault()
+    setDone(false)
     void act.run(async () => {
       await ask(api.PUT('/api/v1/session/password', { body: { present, password } }))
       setPresent('')

@@ -10,7 +10,15 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { TRACE_COLORS } from '../scope/channels'
-import { guessed, INPUT_UNITS, OUTPUT_UNITS, type Said, STRUCTURES, TIME_UNITS } from './imports'
+import {
+  guessed,
+  INPUT_UNITS,
+  OUTPUT_UNITS,
+  type Said,
+  statable,
+  STRUCTURES,
+  TIME_UNITS,
+} from './imports'
 import { StepPlot } from './StepPlot'
 
 const NO_TIME = ''
@@ -77,11 +85,7 @@ export function ImportPanel({ onStored }: { onStored: (file: string) => void }) 
           <Columns found={found} />
           <Choice found={found} said={said} onChange={setSaid} />
           <Curves found={found} said={said} />
-          <Button
-            loading={act.busy}
-            disabled={said.time === null && said.sample_rate_hz === null}
-            onClick={() => void go()}
-          >
+          <Button loading={act.busy} disabled={!statable(said)} onClick={() => void go()}>
             {t('import.go')}
           </Button>
         </>
@@ -153,7 +157,11 @@ function Choice({
         <NativeSelect
           label={t('import.time')}
           value={said.time ?? NO_TIME}
-          onChange={(event) => set({ time: event.currentTarget.value || null })}
+          onChange={(event) => {
+            const time = event.currentTarget.value || null
+            // The server takes a time column or a rate, not both.
+            set({ time, sample_rate_hz: null })
+          }}
           data={[...columns, { value: NO_TIME, label: t('import.noTime') }]}
         />
         {said.time === null ? (
@@ -162,6 +170,7 @@ function Choice({
             unit="Hz"
             value={said.sample_rate_hz}
             onChange={(value) => set({ sample_rate_hz: value })}
+            onInvalid={() => set({ sample_rate_hz: Number.NaN })}
             min={10}
           />
         ) : (
@@ -196,6 +205,7 @@ function Choice({
             unit="Nm"
             value={said.rated_torque_nm}
             onChange={(value) => set({ rated_torque_nm: value })}
+            onInvalid={() => set({ rated_torque_nm: Number.NaN })}
             above={0}
             optional
           />
@@ -206,6 +216,7 @@ function Choice({
             unit="Nm/A"
             value={said.torque_constant_nm_a}
             onChange={(value) => set({ torque_constant_nm_a: value })}
+            onInvalid={() => set({ torque_constant_nm_a: Number.NaN })}
             above={0}
             optional
           />
@@ -228,7 +239,15 @@ function Choice({
       <NativeSelect
         label={t('import.structure')}
         value={said.structure}
-        onChange={(event) => set({ structure: event.currentTarget.value as Said['structure'] })}
+        onChange={(event) =>
+          // What was typed in fields that go away must not count.
+          set({
+            structure: event.currentTarget.value as Said['structure'],
+            output_filter_hz: null,
+            current_bandwidth_hz: null,
+            loop_delay_s: null,
+          })
+        }
         data={STRUCTURES.map((value) => ({ value, label: t(`import.structure.${value}`) }))}
       />
       <Drive said={said} set={set} />
@@ -249,6 +268,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
           unit="Hz"
           value={said.f_min_hz}
           onChange={(value) => set({ f_min_hz: value })}
+          onInvalid={() => set({ f_min_hz: Number.NaN })}
           min={0}
           optional
         />
@@ -257,6 +277,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
           unit="Hz"
           value={said.f_max_hz}
           onChange={(value) => set({ f_max_hz: value })}
+          onInvalid={() => set({ f_max_hz: Number.NaN })}
           above={said.f_min_hz ?? 0}
           optional
         />
@@ -267,6 +288,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="Hz"
               value={said.output_filter_hz}
               onChange={(value) => set({ output_filter_hz: value })}
+              onInvalid={() => set({ output_filter_hz: Number.NaN })}
               above={0}
               optional
               help={t('import.filterHelp')}
@@ -276,6 +298,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="Hz"
               value={said.current_bandwidth_hz}
               onChange={(value) => set({ current_bandwidth_hz: value })}
+              onInvalid={() => set({ current_bandwidth_hz: Number.NaN })}
               above={0}
               optional
             />
@@ -284,6 +307,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="ms"
               value={ms}
               onChange={(value) => set({ loop_delay_s: value === null ? null : value / 1e3 })}
+              onInvalid={() => set({ loop_delay_s: Number.NaN })}
               min={0}
               max={100}
               optional

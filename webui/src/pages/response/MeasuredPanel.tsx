@@ -23,6 +23,7 @@ export function MeasuredPanel({
   content,
   sweep,
   over,
+  sameAxis,
   title,
   notches,
   dark,
@@ -30,8 +31,10 @@ export function MeasuredPanel({
   file: string
   content: MeasurementContent
   sweep: Sweep
-  /** Another response of the same kind. */
+  /** Another response of the same kind and unit. */
   over: Sweep | null
+  /** Whether the other one is of the same axis. */
+  sameAxis: boolean
   title: string
   notches: Notches
   dark: boolean
@@ -111,7 +114,7 @@ export function MeasuredPanel({
       </p>
       <CursorTable sweep={now} over={before} cursors={cursors} />
       <ImportedFacts sweep={sweep} />
-      {mechanics && <Mechanics sweep={sweep} over={over} notches={notches} />}
+      {mechanics && <Mechanics sweep={sweep} over={sameAxis ? over : null} notches={notches} />}
       {Object.keys(sweep.margins).length > 0 && (
         <>
           <h3>{t(mechanics ? 'margin.titleMeanwhile' : 'margin.title')}</h3>

@@ -11,7 +11,7 @@ import { fixed, hertz } from './bode'
 import type { NotchShape } from './results'
 import { remember } from './undo'
 import { UndoNote } from './UndoNote'
-import { inForce, legible, type Notches } from './useNotches'
+import { inForce, legible, type Notches, same } from './useNotches'
 
 const NEW: NotchShape = { center_hz: 400, width_hz: 150, depth_db: -20 }
 
@@ -20,6 +20,7 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
   const t = useT()
   const say = useSay()
   const [confirming, setConfirming] = useState(false)
+  const [bad, setBad] = useState<ReadonlyMap<string, number>>(new Map())
   const write = useAction()
   const { now, wanted, preview, refused, edited } = notches
   if (!now) {
@@ -35,6 +36,21 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
       </Panel>
     ) : null
   }
+  const put = (slot: number, notch: NotchShape, name: keyof NotchShape, value: number | null) => {
+    const next = new Map(bad)
+    // The field shows what is no number, where the notch still has its last one.
+    if (value === null) next.set(`${slot} ${name}`, notch[name])
+    else next.delete(`${slot} ${name}`)
+    setBad(next)
+    if (value !== null) notches.set(slot, { ...notch, [name]: value })
+  }
+  const unsound = wanted.some(
+    (notch, i) =>
+      notch !== null &&
+      (['center_hz', 'width_hz', 'depth_db'] as const).some(
+        (name) => bad.get(`${i} ${name}`) === notch[name],
+      ),
+  )
   const go = () =>
     write.run(async () => {
       const done = await ask(
@@ -59,12 +75,13 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
                 label={t('notch.slot', { number: slot.slot + 1 })}
                 checked={notch !== null}
                 disabled={!notches.shaped}
-                onChange={(event) =>
+                onChange={(event) => {
+                  setBad(new Map([...bad].filter(([key]) => !key.startsWith(`${i} `))))
                   notches.set(
                     i,
                     event.currentTarget.checked ? (slot.notch ? legible(slot.notch) : NEW) : null,
                   )
-                }
+                }}
               />
               {notch && notches.shaped && (
                 <div className="fields">
@@ -73,27 +90,21 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
                     unit="Hz"
                     value={notch.center_hz}
                     above={0}
-                    onChange={(center) =>
-                      center !== null && notches.set(i, { ...notch, center_hz: center })
-                    }
+                    onChange={(center) => put(i, notch, 'center_hz', center)}
                   />
                   <NumberField
                     label={t('notch.width')}
                     unit="Hz"
                     value={notch.width_hz}
                     above={0}
-                    onChange={(width) =>
-                      width !== null && notches.set(i, { ...notch, width_hz: width })
-                    }
+                    onChange={(width) => put(i, notch, 'width_hz', width)}
                   />
                   <NumberField
                     label={t('notch.depth')}
                     unit="dB"
                     value={notch.depth_db}
                     max={0}
-                    onChange={(depth) =>
-                      depth !== null && notches.set(i, { ...notch, depth_db: depth })
-                    }
+                    onChange={(depth) => put(i, notch, 'depth_db', depth)}
                   />
                 </div>
               )}
@@ -119,7 +130,7 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
       <div className="row wrap">
         <Button
           variant="filled"
-          disabled={!edited || refused !== null || preview === null}
+          disabled={!edited || unsound || refused !== null || preview === null}
           loading={write.busy}
           onClick={() => setConfirming(true)}
         >
@@ -162,8 +173,6 @@ export function NotchEditor({ drive, notches }: { drive: string; notches: Notche
     </Panel>
   )
 }
-
-const same = (a: NotchShape | null, b: NotchShape | null) => JSON.stringify(a) === JSON.stringify(b)
 
 /** What is known of one notch next to its values. */
 function SlotNote({ of }: { of: NotchSlotInfo }) {

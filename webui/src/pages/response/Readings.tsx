@@ -1,6 +1,6 @@
 import { Button } from '@mantine/core'
 import { type Key, useT } from '../../i18n'
-import { fixed, hertz, nearest } from './bode'
+import { fixed, hertz, nearest, wrapWhole } from './bode'
 import type { Margins, Sweep } from './results'
 
 /** The curve's values under both cursors, and their difference. */
@@ -19,7 +19,8 @@ export function CursorTable({
     return {
       f: each.frequency_hz[i],
       db: each.magnitude_db[i] ?? null,
-      deg: each.phase_deg[i] ?? null,
+      // By the same turns as the curve is drawn.
+      deg: wrapWhole(each.phase_deg, each.frequency_hz)[i] ?? null,
       spread: each.std_db[i] ?? null,
       coherence: each.coherence[i] ?? null,
     }

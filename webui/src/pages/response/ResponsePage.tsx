@@ -17,7 +17,7 @@ import './response.css'
 import { filesOf } from './results'
 import { SweepForm } from './SweepForm'
 import { useGains } from './useGains'
-import { useMeasurements, useSweep } from './useMeasurements'
+import { ofAxis, ofOneAxis, useMeasurements, useSweep } from './useMeasurements'
 import { useNotches } from './useNotches'
 import { useToolJob } from './useToolJob'
 
@@ -54,7 +54,10 @@ export function ResponsePage({ drive }: { drive: string }) {
     void measured.refresh()
   })
   if (!summary) return null
-  const mechanics = sweep?.kind === 'mechanics'
+  const predictable = sweep?.kind === 'mechanics' && sweep.trusted && !sweep.imported
+  const own = content !== null && ofAxis(content.info, summary)
+  const alike = other.sweep?.kind === sweep?.kind ? other.sweep : null
+  const otherUnit = sweep && alike && alike.unit !== sweep.unit ? alike.unit : null
   return (
     <div className="page">
       <h1>
@@ -89,13 +92,19 @@ export function ResponsePage({ drive }: { drive: string }) {
           <ProblemNote problem={problem ?? other.problem} />
           {shown === null && !problem && <p className="panel empty">{t('response.empty')}</p>}
           {shown !== null && !content && !problem && <p className="panel empty">{t('loading')}</p>}
+          {otherUnit !== null && (
+            <p className="note warn">
+              {t('response.otherUnit', { unit: otherUnit, shown: sweep?.unit ?? '' })}
+            </p>
+          )}
           {content && sweep && shown !== null && (
             <MeasuredPanel
               key={shown}
               file={shown}
               content={content}
               sweep={sweep}
-              over={other.sweep?.kind === sweep.kind ? other.sweep : null}
+              over={otherUnit === null ? alike : null}
+              sameAxis={other.content !== null && ofOneAxis(other.content.info, content.info)}
               title={titleOf(
                 measured.list.find((each) => each.file === shown),
                 t,
@@ -105,7 +114,8 @@ export function ResponsePage({ drive }: { drive: string }) {
             />
           )}
           <NotchEditor drive={drive} notches={notches} />
-          {mechanics && sweep.trusted && !sweep.imported && shown !== null && gains && (
+          {predictable && !own && <p className="note info">{t('predict.otherAxis')}</p>}
+          {predictable && own && shown !== null && gains && (
             <PredictionPanel
               drive={drive}
               file={shown}

@@ -38,8 +38,13 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
   const obstacle = useObstacle(drive)
   const dark = useComputedColorScheme('light') === 'dark'
   const [previewed, setPreviewed] = useState(false)
+  const highest = high ?? Number.POSITIVE_INFINITY
   const request: SweepRequest | null =
-    limits.limits === null || low === null || share === null || count === null
+    limits.limits === null ||
+    low === null ||
+    share === null ||
+    count === null ||
+    !(highest >= 4 * low)
       ? null
       : {
           ...limits.limits,
@@ -127,6 +132,7 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
             unit="Hz"
             value={high}
             onChange={setHigh}
+            onInvalid={() => setHigh(Number.NaN)}
             optional
             min={4 * (low ?? 3)}
             help={t('sweep.highHelp')}

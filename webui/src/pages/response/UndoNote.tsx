@@ -1,4 +1,5 @@
 import { Button } from '@mantine/core'
+import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/format'
@@ -11,10 +12,13 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
   const t = useT()
   const last = useChanges(drive).at(-1)
   const act = useAction()
+  const [tried, setTried] = useState('')
   if (!last) return <ProblemNote problem={act.problem} onClose={act.clear} />
-  const since = changedSince(act.problem, last.before)
+  // A refusal is of the change that was to be undone, not of one written since.
+  const since = tried === last.time && changedSince(act.problem, last.before)
   const undo = () =>
     act.run(async () => {
+      setTried(last.time)
       await ask(
         api.POST('/api/v1/drives/{drive_id}/tune/undo', {
           params: { path: { drive_id: drive } },
@@ -22,7 +26,7 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
           body: { before: last.before, after: since ? null : (last.after ?? null) },
         }),
       )
-      forget(drive)
+      forget(drive, last)
       noteUndone()
       onUndone()
     })

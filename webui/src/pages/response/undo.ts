@@ -49,7 +49,8 @@ export function remember(drive: string, what: Change['what'], done: Written): vo
   if (Object.keys(done.before).length === 0) return
   const { before, after = null } = done
   const change = { what, time: new Date().toISOString(), before, after }
-  store(drive, [...read(drive), change].slice(-KEPT))
+  // What another tab has written meanwhile is among the stored ones.
+  store(drive, [...stored(drive), change].slice(-KEPT))
 }
 
 /** Whether a change was not undone because a value of it was changed again since. */
@@ -70,8 +71,18 @@ export function noteUndone(): void {
   publish('undone')
 }
 
-/** Take the newest change off the list, once it has been undone. */
-export const forget = (drive: string) => store(drive, read(drive).slice(0, -1))
+/** Take a change off the list, once it has been undone. */
+export const forget = (drive: string, undone: Change) =>
+  store(
+    drive,
+    stored(drive).filter((each) => each.time !== undone.time || each.what !== undone.what),
+  )
+
+// Another tab of this browser has written or undone something.
+globalThis.window?.addEventListener('storage', () => {
+  known.clear()
+  for (const listener of listeners) listener()
+})
 
 /** Changes to an axis that can be undone, newest last. */
 export const useChanges = (drive: string): Change[] =>

@@ -1,6 +1,6 @@
 import { useCallback, useEffect, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
-import type { MeasurementContent, MeasurementInfo, Problem } from '../../api/schema'
+import type { DriveSummary, MeasurementContent, MeasurementInfo, Problem } from '../../api/schema'
 import { useLink } from '../../live/store'
 import { asSweep } from './results'
 
@@ -10,6 +10,20 @@ export const comparable = (one: string | undefined, other: string): boolean =>
   one === other ||
   (one === IMPORTED && other === 'sweep-mechanics') ||
   (one === 'sweep-mechanics' && other === IMPORTED)
+
+type Measured = Pick<MeasurementInfo, 'drive' | 'profile' | 'serial'>
+
+/** Whether it was measured on this axis, as `belongs` of backend/report/gather.py has it. */
+export const ofAxis = (
+  { drive, profile, serial }: Measured,
+  axis: Pick<DriveSummary, 'name' | 'profile' | 'serial'>,
+): boolean =>
+  profile === axis.profile &&
+  (serial !== null && axis.serial !== null ? serial === axis.serial : drive === axis.name)
+
+/** Whether two were measured on one axis. */
+export const ofOneAxis = (one: Measured, other: Measured): boolean =>
+  ofAxis(one, { ...other, name: other.drive })
 
 /**
  * Stored measurements (of a kind), newest first; those that cannot be used are among them.

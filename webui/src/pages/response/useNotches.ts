@@ -1,4 +1,4 @@
-import { useState } from 'react'
+import { useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { NotchPreviewInfo, NotchSlotInfo } from '../../api/schema'
 import { useAnswer } from '../../widgets/useAnswer'
@@ -19,16 +19,44 @@ export const legible = (notch: NotchShape): NotchShape => ({
   depth_db: Number(notch.depth_db.toFixed(1)),
 })
 
+export const same = (a: NotchShape | null, b: NotchShape | null) =>
+  JSON.stringify(a) === JSON.stringify(b)
+
+/**
+ * What is wanted once the slots were read again: slots that nobody edited are as they are in the
+ * drive now, the others stay as they were typed.
+ */
+export function merged(
+  wanted: readonly (NotchShape | null)[],
+  before: readonly NotchSlotInfo[],
+  now: readonly NotchSlotInfo[],
+): (NotchShape | null)[] {
+  return now.map((slot, i) => {
+    const [old, typed] = [before[i], wanted[i]]
+    const untouched = old === undefined || typed === undefined || same(typed, inForce(old))
+    return untouched ? inForce(slot) : typed
+  })
+}
+
 /** Notches of a drive as they are, as they are wanted, and what the drive would make of that. */
 export function useNotches(drive: string, frequency: number[]) {
   const [wanted, setWanted] = useState<(NotchShape | null)[]>([])
+  const before = useRef<NotchSlotInfo[]>([])
   const path = { params: { path: { drive_id: drive } } }
   const slots = useFetched<NotchSlotInfo[]>(async () => {
     const found = await ask(api.GET('/api/v1/drives/{drive_id}/notches', path))
-    setWanted(found.map(inForce))
+    // Also after every loss of the connection, which must not drop what was typed.
+    const known = before.current
+    setWanted((old) => merged(old, known, found))
+    before.current = found
     return found
   }, [drive])
-  const { problem, read } = slots
+  const { problem } = slots
+  /** Read the slots again, and drop what was typed. */
+  const read = () => {
+    before.current = []
+    return slots.read()
+  }
   const now = problem ? null : slots.data
   const asked = JSON.stringify(wanted)
   const { found: preview, problem: refused } = useAnswer<NotchPreviewInfo>(

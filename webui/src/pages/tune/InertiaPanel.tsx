@@ -42,6 +42,7 @@ export function InertiaPanel({
   const result = asInertia(job?.result)
   const complete =
     limits !== null &&
+    !Number.isNaN(motor) &&
     repetitions !== null &&
     scheme.complete &&
     searchTorque !== null &&
@@ -104,6 +105,7 @@ export function InertiaPanel({
           unit="kg·m²"
           value={motor}
           onChange={setMotor}
+          onInvalid={() => setMotor(Number.NaN)}
           above={0}
           optional
           help={t('inertia.motorHelp')}

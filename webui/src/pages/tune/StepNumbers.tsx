@@ -50,13 +50,15 @@ export function StepNumbers({ step, over = null }: { step: Step; over?: Step | n
             </tr>
           </thead>
           <tbody className="num">
-            {ROWS.filter(({ read }) => read(step) !== null).map(({ text, read }) => (
-              <tr key={text}>
-                <td>{t(text)}</td>
-                {over && <td className="right">{read(over) ?? '—'}</td>}
-                <td className="right">{read(step)}</td>
-              </tr>
-            ))}
+            {ROWS.filter(({ read }) => (read(step) ?? (over && read(over))) !== null).map(
+              ({ text, read }) => (
+                <tr key={text}>
+                  <td>{t(text)}</td>
+                  {over && <td className="right">{read(over) ?? '—'}</td>}
+                  <td className="right">{read(step) ?? '—'}</td>
+                </tr>
+              ),
+            )}
           </tbody>
         </table>
       </div>

@@ -92,6 +92,7 @@ export function AutotunePanel({
           unit="kg·m²"
           value={motor}
           onChange={setMotor}
+          onInvalid={() => setMotor(Number.NaN)}
           above={0}
           optional
           help={t('autotune.motorHelp')}
@@ -112,7 +113,9 @@ export function AutotunePanel({
         </p>
       )}
       <StartButton
-        obstacle={obstacle ?? (scheme.complete ? null : t('start.incomplete'))}
+        obstacle={
+          obstacle ?? (scheme.complete && !Number.isNaN(motor) ? null : t('start.incomplete'))
+        }
         busy={start.busy}
         onStart={() => void go()}
       >

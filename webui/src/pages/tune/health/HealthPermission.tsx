@@ -123,9 +123,10 @@ function Permit({
     setDays((now) => (now.includes(day) ? now.filter((each) => each !== day) : [...now, day]))
   const go = () =>
     give.run(async () => {
+      if (lasts === null || pause === null) return
       const params = { path: { drive_id: drive } }
-      const until = new Date(Date.now() + (lasts ?? 0) * DAY_MS).toISOString()
-      const body = { until, days, at, trigger, pause_min: pause ?? 60, person, secured }
+      const until = new Date(Date.now() + lasts * DAY_MS).toISOString()
+      const body = { until, days, at, trigger, pause_min: pause, person, secured }
       onGiven(await ask(api.PUT('/api/v1/drives/{drive_id}/health/permission', { params, body })))
       setSecured(false)
     })
@@ -177,7 +178,13 @@ function Permit({
       <div className="row wrap">
         <Button
           loading={give.busy}
-          disabled={!secured || (days.length === 0 && !trigger)}
+          disabled={
+            !secured ||
+            (days.length === 0 && !trigger) ||
+            lasts === null ||
+            pause === null ||
+            at === ''
+          }
           onClick={() => void go()}
         >
           {t('health.permit')}

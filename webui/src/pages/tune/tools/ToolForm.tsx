@@ -63,6 +63,7 @@ export function fieldsOf(settings: Record<string, unknown>): Field[] {
   })
 }
 
+/** NaN is a text that is no valid number. */
 export type Values = Record<string, number | boolean | null>
 
 let asked: Promise<ToolInfo[]> | undefined
@@ -137,6 +138,7 @@ export function ToolForm({
               {...field.limits}
               value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
               onChange={(value) => set(field.name, value)}
+              onInvalid={() => set(field.name, Number.NaN)}
               integer={field.type === 'integer'}
               optional={field.optional}
             />
@@ -148,9 +150,11 @@ export function ToolForm({
   )
 }
 
-/** Whether every field that must have a value has one. */
+/** Whether every field that must have a value has one, and none has a text that is no number. */
 export const complete = (fields: Field[], values: Values): boolean =>
-  fields.every((field) => field.optional || values[field.name] !== null)
+  fields.every(({ name, optional }) =>
+    Number.isNaN(values[name]) ? false : optional || values[name] !== null,
+  )
 
 export const initialValues = (fields: Field[]): Values =>
   Object.fromEntries(fields.map((field) => [field.name, field.initial]))
