@@ -1,6 +1,7 @@
 import { api, ask, setCsrf } from '../api/client'
 import type { Session } from '../api/schema'
 import { publish, useStore } from '../live/store'
+import * as browser from '../widgets/kept'
 
 /** Who this page is for; null until the server has said. */
 let session: Session | null = null
@@ -8,15 +9,20 @@ let asking = false
 
 /** A flag of the browser's tab: somebody was logged in, so STOP may still be theirs. */
 const WAS_IN = 'servodeck.wasIn'
+let wasIn = false
 
-const currentSession = () => session
+export const currentSession = () => session
 export const useSession = () => useStore('session', currentSession)
-export const mayHaveStop = () => sessionStorage.getItem(WAS_IN) !== null
+/** True also where the browser keeps no such flag and somebody has been logged in since. */
+export const mayHaveStop = () => wasIn || browser.kept(WAS_IN, 'sessionStorage') !== null
 
 export function keep(next: Session): void {
   session = next
   setCsrf(next.csrf ?? null)
-  if (next.person !== null) sessionStorage.setItem(WAS_IN, '1')
+  if (next.person !== null) {
+    wasIn = true
+    browser.keep(WAS_IN, '1', 'sessionStorage')
+  }
   publish('session')
 }
 
@@ -44,7 +50,8 @@ export async function checkSession(): Promise<void> {
 
 export async function leave(): Promise<void> {
   await ask(api.DELETE('/api/v1/session'))
-  sessionStorage.removeItem(WAS_IN)
+  wasIn = false
+  browser.keep(WAS_IN, null, 'sessionStorage')
   window.location.reload()
 }
 

@@ -1,5 +1,6 @@
 import { useSyncExternalStore } from 'react'
 import type { JobInfo, Problem } from '../api/schema'
+import { keep, kept } from '../widgets/kept'
 import { catalogue, type Key } from './catalogue'
 import { load, words, type Message } from './message'
 
@@ -13,7 +14,7 @@ let language: Language = initial()
 let generation = 0
 
 function initial(): Language {
-  const stored = globalThis.localStorage?.getItem(STORED)
+  const stored = kept(STORED)
   if (stored === 'en' || stored === 'zh') return stored
   return globalThis.navigator?.language.startsWith('zh') ? 'zh' : 'en'
 }
@@ -40,7 +41,7 @@ function mark(to: Language): void {
 
 export function setLanguage(next: Language): void {
   language = next
-  globalThis.localStorage?.setItem(STORED, next)
+  keep(STORED, next)
   mark(next)
   fetchTexts()
   for (const listener of listeners) listener()

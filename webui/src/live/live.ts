@@ -1,6 +1,7 @@
 import { API_ROOT, api, ask, setConnection } from '../api/client'
 import type { FromPage, JogStart, JogStop, ToPage } from '../api/schema'
 import { addChat, addNotice, setCursor, setPeople, setPointer } from './people'
+import { forgetServerClock, heardServerTime } from './server-clock'
 import * as store from './store'
 import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker-messages'
 
@@ -76,12 +77,15 @@ export async function loadRows(drive: string): Promise<void> {
 function receive(message: ToPage): void {
   switch (message.type) {
     case 'hello':
+      forgetServerClock()
       setConnection(message.connection)
       store.contents.connection = message.connection
       void refresh()
       break
     case 'state':
       store.setState(message.state, true)
+      // The time of one that is not fresh is that of the last answer of the drive.
+      if (message.state.fresh) heardServerTime(message.state.time)
       break
     case 'drives':
       for (const drive of store.setDrives(message.drives)) void loadRows(drive).catch(() => {})
@@ -90,6 +94,7 @@ function receive(message: ToPage): void {
       store.setReadings(message.drive, message.values, true)
       break
     case 'job':
+      if (message.job.ended !== null) heardServerTime(message.job.ended)
       store.setJob(message.job)
       break
     case 'jog_ended':
@@ -105,6 +110,7 @@ function receive(message: ToPage): void {
       break
     case 'log':
       store.addLog([message.entry])
+      heardServerTime(message.entry.time)
       break
     case 'refused':
       store.contents.refused = { ...message, at: Date.now() }

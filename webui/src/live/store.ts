@@ -13,6 +13,7 @@ import type {
   ScopeInfo,
   StopResult,
 } from '../api/schema'
+import { serverNow } from './server-clock'
 import type { LinkState } from './socket'
 import type { TriggerState } from './worker-messages'
 
@@ -220,7 +221,7 @@ export function endForgotten(before: string[], known: JobInfo[]): void {
     const job = contents.jobs.get(id)
     if (!job || job.state !== 'running' || known.some((each) => each.id === id)) continue
     const problem = { type: FORGOTTEN, title: job.title, status: 0, detail: '' }
-    setJob({ ...job, state: 'failed', ended: new Date().toISOString(), problem })
+    setJob({ ...job, state: 'failed', ended: new Date(serverNow()).toISOString(), problem })
   }
 }
 

@@ -3,6 +3,7 @@ import { useEffect, useState } from 'react'
 import { api, ask } from '../api/client'
 import type { JobInfo } from '../api/schema'
 import { type Say, type T, useSay, useT } from '../i18n'
+import { serverNow } from '../live/server-clock'
 import { setJob, useJob } from '../live/store'
 import { clock, duration } from './format'
 import { ProblemNote } from './ProblemNote'
@@ -104,10 +105,10 @@ function seconds(job: JobInfo, now: number): number {
 }
 
 function useNow(ticking: boolean): number {
-  const [now, setNow] = useState(Date.now())
+  const [now, setNow] = useState(serverNow)
   useEffect(() => {
     if (!ticking) return
-    const timer = setInterval(() => setNow(Date.now()), 500)
+    const timer = setInterval(() => setNow(serverNow()), 500)
     return () => clearInterval(timer)
   }, [ticking])
   return now

@@ -1,4 +1,5 @@
 import type { AxisState, JobInfo } from '../../api/schema'
+import { keep, kept } from '../../widgets/kept'
 import type { AxisPage } from '../router'
 
 /** The steps of the guided tour, in order. */
@@ -63,11 +64,11 @@ const STORED = 'servodeck.tour'
 
 /** The place that this browser remembers; a new browser is offered the tour. */
 export function storedPlace(): Place {
-  const found = localStorage.getItem(STORED)
+  const found = kept(STORED)
   if (found === 'left') return 'left'
   return STEPS.find((each) => each === found) ?? 'offer'
 }
 
 export function storePlace(place: Place): void {
-  localStorage.setItem(STORED, place)
+  keep(STORED, place)
 }

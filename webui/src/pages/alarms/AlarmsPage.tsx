@@ -7,6 +7,7 @@ import { FaultList } from '../../widgets/FaultList'
 import { FaultResetButton, FaultResetProblem, useFaultReset } from '../../widgets/FaultReset'
 import { dateTime } from '../../widgets/format'
 import { Panel } from '../../widgets/Panel'
+import { Said } from '../../widgets/Said'
 import { Bundles } from './Bundles'
 import { History } from './History'
 
@@ -84,7 +85,9 @@ function Log({ drive }: { drive: string }) {
           <li key={`${entry.time} ${i}`} className={entry.level}>
             <time className="num dim">{dateTime(entry.time)}</time>
             <strong>{t(`log.${entry.level}`)}</strong>
-            <span className="grow">{entry.text}</span>
+            <span className="grow">
+              <Said message={entry.message} words={entry.text} />
+            </span>
             <span className="dim">{entry.person}</span>
           </li>
         ))}

@@ -32,7 +32,11 @@ export function MovePanel({
 }) {
   const t = useT()
   const { units } = unit
-  const [mode, setMode] = useState<Mode>('PP')
+  const possible = (Object.keys(MODES) as Mode[]).filter(
+    (each) => !state || state.modes.includes(MODES[each]),
+  )
+  const [chosen, setMode] = useState<Mode>('PP')
+  const mode = possible.includes(chosen) ? chosen : (possible[0] ?? 'PP')
   const [target, setTarget] = useState<number | null>(null)
   const [relative, setRelative] = useState(true)
   const [consent, setConsent] = useState(false)
@@ -84,9 +88,6 @@ export function MovePanel({
       onStarted(job.id)
       setConsent(false) // agreed to for one movement, not for the next
     })
-  const possible = (Object.keys(MODES) as Mode[]).filter(
-    (each) => !state || state.modes.includes(MODES[each]),
-  )
   return (
     <Panel title={t('move.title')}>
       <SegmentedControl
@@ -98,6 +99,8 @@ export function MovePanel({
       <p className="dim">{t(`move.help.${mode}`)}</p>
       <div className="fields">
         <NumberField
+          // Its text goes with its value.
+          key={key}
           label={t('move.target')}
           unit={targetUnit}
           value={target}

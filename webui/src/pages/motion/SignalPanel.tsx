@@ -85,15 +85,22 @@ export function SignalPanel({
     setAmplitude(null)
   }, [key])
   const bus = buses.find((each) => drive.ports.some((port) => port.url === each.url && each.cyclic))
-  const values = [amplitude, frequency, last, duration, acceleration, travel, speed, torque]
+  const has = {
+    frequency: shape === 'sine' || shape === 'chirp',
+    last: shape === 'chirp',
+    slope: shape === 'ramp' || shape === 'trapezoid',
+  }
+  const complete =
+    ![amplitude, duration, travel, speed, torque].includes(null) &&
+    !(has.frequency && frequency === null) &&
+    !(has.last && last === null) &&
+    !(has.slope && acceleration === null)
   const go = () =>
     start.run(async () => {
       if (
+        !complete ||
         amplitude === null ||
-        frequency === null ||
-        last === null ||
         duration === null ||
-        acceleration === null ||
         travel === null ||
         speed === null ||
         torque === null
@@ -107,9 +114,10 @@ export function SignalPanel({
             shape,
             amplitude,
             duration_s: duration,
-            frequency_hz: frequency,
-            frequency_end_hz: last,
-            acceleration,
+            // What the shape does not have is not looked at.
+            frequency_hz: frequency ?? 1,
+            frequency_end_hz: last ?? 10,
+            acceleration: acceleration ?? 1,
             travel_limit: travel,
             speed_limit: speed,
             torque_limit: torque,
@@ -142,12 +150,14 @@ export function SignalPanel({
           data={SHAPES.map((each) => ({ value: each, label: t(`signal.${each}`) }))}
         />
         <NumberField
+          // Its text goes with its value.
+          key={key}
           label={t('signal.amplitude')}
           unit={units[MODES[mode].quantity] ?? ''}
           value={amplitude}
           onChange={setAmplitude}
         />
-        {(shape === 'sine' || shape === 'chirp') && (
+        {has.frequency && (
           <NumberField
             label={t(shape === 'chirp' ? 'signal.from' : 'signal.frequency')}
             unit="Hz"
@@ -157,7 +167,7 @@ export function SignalPanel({
             max={2000}
           />
         )}
-        {shape === 'chirp' && (
+        {has.last && (
           <NumberField
             label={t('signal.to')}
             unit="Hz"
@@ -167,7 +177,7 @@ export function SignalPanel({
             max={2000}
           />
         )}
-        {(shape === 'ramp' || shape === 'trapezoid') && (
+        {has.slope && (
           <NumberField
             label={t('signal.slope')}
             unit={`${units[MODES[mode].quantity] ?? ''}/s`}
@@ -191,11 +201,7 @@ export function SignalPanel({
       <StartButton
         obstacle={
           obstacle ??
-          (!bus?.cyclic?.running
-            ? t('start.noExchange')
-            : values.includes(null)
-              ? t('start.incomplete')
-              : null)
+          (!bus?.cyclic?.running ? t('start.noExchange') : !complete ? t('start.incomplete') : null)
         }
         busy={start.busy}
         onStart={() => void go()}

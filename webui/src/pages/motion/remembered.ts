@@ -1,4 +1,5 @@
 import { useEffect, useState } from 'react'
+import { keep, kept } from '../../widgets/kept'
 
 /** A number kept in this browser for one drive. `start` undefined: not known yet. */
 export function useRemembered(
@@ -15,13 +16,13 @@ export function useRemembered(
     value,
     (next) => {
       setValue(next)
-      if (next !== null) localStorage.setItem(place, String(next))
+      if (next !== null) keep(place, String(next))
     },
   ]
 }
 
 function read(place: string): number | null {
-  const stored = localStorage.getItem(place)
+  const stored = kept(place)
   const number = stored === null ? Number.NaN : Number(stored)
   return Number.isFinite(number) ? number : null
 }

@@ -1,5 +1,6 @@
 import { useState } from 'react'
 import type { AxisState } from '../../api/schema'
+import { keep, kept } from '../../widgets/kept'
 import { useRecord } from '../../widgets/useFunctions'
 import { possibleUnits, type TravelName, travelUnit } from './travelUnit'
 
@@ -8,12 +9,12 @@ export function useTravelUnit(drive: string, state: AxisState | null) {
   const record = useRecord(drive)
   const place = `servodeck.${drive}.motion.unit`
   const [choices, setChoices] = useState<Record<string, string>>({})
-  const chosen = choices[place] ?? localStorage.getItem(place) ?? 'rev'
+  const chosen = choices[place] ?? kept(place) ?? 'rev'
   return {
     unit: travelUnit(chosen, record, state),
     possible: possibleUnits(record, state),
     choose: (name: TravelName) => {
-      localStorage.setItem(place, name)
+      keep(place, name)
       setChoices((old) => ({ ...old, [place]: name }))
     },
   }

@@ -48,8 +48,12 @@ export function OverviewPage({ drive }: { drive: string }) {
       {reported && state && (
         <Panel title={t('faults.active')} className="fault-panel">
           <FaultList drive={drive} faults={state.faults} />
-          {state.faults.length === 0 && <p className="good-text">{t('faults.none')}</p>}
-          <FaultResetButton reset={reset} disabled={state.faults.length === 0} />
+          {state.faults.length === 0 && (
+            <p className={state.fresh ? 'good-text' : 'dim'}>
+              {t(state.fresh ? 'faults.none' : 'state.noAnswer')}
+            </p>
+          )}
+          <FaultResetButton reset={reset} disabled={!state.fresh || state.faults.length === 0} />
           <FaultResetProblem reset={reset} />
         </Panel>
       )}

@@ -4,6 +4,7 @@ import { href } from '../../app/router'
 import { useHasTour } from '../../app/tour/tour'
 import { useT } from '../../i18n'
 import { useLink } from '../../live/store'
+import { keep, kept } from '../../widgets/kept'
 import { Panel } from '../../widgets/Panel'
 import '../scene/scene.css'
 import { SceneFrame } from '../scene/SceneFrame'
@@ -17,12 +18,12 @@ const SHOWN = 'servodeck.overview.scene'
 export function SceneHere({ drive }: { drive: string }) {
   const t = useT()
   const demo = useHasTour(useLink().open)
-  const [chosen, setChosen] = useState(() => localStorage.getItem(SHOWN))
+  const [chosen, setChosen] = useState(() => kept(SHOWN))
   // The demo shows its load from the start; the computer that draws it is the one that serves it.
   const shown = chosen === null ? demo : chosen === '1'
   const toggle = () => {
     const next = shown ? '0' : '1'
-    localStorage.setItem(SHOWN, next)
+    keep(SHOWN, next)
     setChosen(next)
   }
   return (

@@ -5,6 +5,7 @@ import { api, ask } from '../../api/client'
 import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
+import { serverNow } from '../../live/server-clock'
 import { useLink, useReading } from '../../live/store'
 import { duration } from '../../widgets/format'
 import { Icon } from '../../widgets/Icon'
@@ -112,9 +113,9 @@ function Watched({
 }) {
   const t = useT()
   const reading = useReading(drive, row.key) ?? row.reading
-  const [now, setNow] = useState(Date.now())
+  const [now, setNow] = useState(serverNow)
   useEffect(() => {
-    const timer = setInterval(() => setNow(Date.now()), 1000)
+    const timer = setInterval(() => setNow(serverNow()), 1000)
     return () => clearInterval(timer)
   }, [])
   const age = reading.time === null ? null : Math.max(0, now - Date.parse(reading.time))

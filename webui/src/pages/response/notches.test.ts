@@ -18,7 +18,7 @@ const slot = (number: number, center_hz: number | null): NotchSlotInfo =>
     raw: {},
     note: '',
     note_message: null,
-  }) as NotchSlotInfo
+  })
 const shape = (center_hz: number) => ({ center_hz, width_hz: 100, depth_db: -20 })
 const LINES = [10, 20]
 let slots: NotchSlotInfo[] = []

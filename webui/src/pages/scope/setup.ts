@@ -3,6 +3,7 @@ import { ExpressionError, parse } from '../../live/expression'
 import type { TriggerSettings } from '../../live/trigger'
 import type { ScopeConfig, ScopeSource, ScopeTrigger } from '../../live/worker-messages'
 import { type Span, sound } from '../../plots/yscale'
+import { keep, kept } from '../../widgets/kept'
 import { STATUS_WORD, VELOCITY_ACTUAL } from '../../widgets/objects'
 import type { Channel } from './channels'
 
@@ -36,7 +37,7 @@ export const EMPTY: ScopeSetup = {
 /** The set-up that this browser used last; null when there is none. */
 export function storedSetup(): ScopeSetup | null {
   try {
-    const found = JSON.parse(localStorage.getItem(STORED) ?? 'null') as Partial<ScopeSetup> | null
+    const found = JSON.parse(kept(STORED) ?? 'null') as Partial<ScopeSetup> | null
     if (!found || !Array.isArray(found.traces) || !Array.isArray(found.maths)) return null
     return complete(found)
   } catch {
@@ -45,13 +46,13 @@ export function storedSetup(): ScopeSetup | null {
 }
 
 /** A set-up that an earlier version kept, with what it did not know yet. */
-const complete = (kept: Partial<ScopeSetup>): ScopeSetup => ({
+const complete = (old: Partial<ScopeSetup>): ScopeSetup => ({
   ...EMPTY,
-  ...kept,
-  trigger: { ...EMPTY.trigger, ...kept.trigger },
+  ...old,
+  trigger: { ...EMPTY.trigger, ...old.trigger },
 })
 
-export const storeSetup = (setup: ScopeSetup) => localStorage.setItem(STORED, JSON.stringify(setup))
+export const storeSetup = (setup: ScopeSetup) => keep(STORED, JSON.stringify(setup))
 
 /** A name that no trace has yet: `c1`, `c2`… for channels, `m1`… for computed ones. */
 export function freeId(setup: ScopeSetup, letter: 'c' | 'm'): string {

@@ -1,5 +1,5 @@
-import { API_ROOT, ProblemError } from '../../api/client'
-import type { Problem, ScopeSetup, SnapshotHeader, SnapshotTrace } from '../../api/schema'
+import { api, ask } from '../../api/client'
+import type { ScopeSetup, SnapshotHeader, SnapshotTrace } from '../../api/schema'
 import type { Samples } from '../../live/worker-messages'
 
 const MAGIC = 'SDSNAP1\n'
@@ -40,18 +40,28 @@ function unpackSnapshot(data: ArrayBuffer): { header: SnapshotHeader; samples: S
   return { header, samples }
 }
 
-const address = (name: string) => `${API_ROOT}/api/v1/scope/snapshots/${encodeURIComponent(name)}`
+const raw = { 'Content-Type': 'application/octet-stream' }
 
-/** The file's bytes do not fit the generated client, which speaks JSON. */
+/** The file's bytes as they are, through the client that every other request goes through. */
 export async function storeSnapshot(name: string, file: Blob): Promise<void> {
-  const answer = await fetch(address(name), { method: 'POST', body: file })
-  if (!answer.ok) throw new ProblemError((await answer.json()) as Problem)
+  await ask(
+    api.POST('/api/v1/scope/snapshots/{name}', {
+      params: { path: { name } },
+      body: file as never,
+      bodySerializer: (body: unknown) => body as BodyInit,
+      headers: raw,
+    }),
+  )
 }
 
-export async function loadSnapshot(name: string): ReturnType<typeof unpackAsync> {
-  const answer = await fetch(address(name))
-  if (!answer.ok) throw new ProblemError((await answer.json()) as Problem)
-  return unpackAsync(answer)
+export async function loadSnapshot(
+  name: string,
+): Promise<{ header: SnapshotHeader; samples: Samples[] }> {
+  const data = await ask(
+    api.GET('/api/v1/scope/snapshots/{name}', {
+      params: { path: { name } },
+      parseAs: 'arrayBuffer',
+    }),
+  )
+  return unpackSnapshot(data)
 }
-
-const unpackAsync = async (answer: Response) => unpackSnapshot(await answer.arrayBuffer())

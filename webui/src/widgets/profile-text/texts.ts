@@ -2,6 +2,7 @@ import { useCallback, useEffect, useSyncExternalStore } from 'react'
 import { api, ask } from '../../api/client'
 import { useLanguage } from '../../i18n'
 import { useDrive, useDrives, useLink } from '../../live/store'
+import { keep, kept } from '../kept'
 
 /** English text of a profile to its translation; null until the server has said it. */
 export type Texts = ReadonlyMap<string, string> | null
@@ -11,7 +12,7 @@ const asked = new Set<string>()
 const listeners = new Set<() => void>()
 
 const ORIGINAL = 'servodeck.original'
-let original = globalThis.localStorage?.getItem(ORIGINAL) === 'yes'
+let original = kept(ORIGINAL) === 'yes'
 
 function changed(): void {
   for (const listener of listeners) listener()
@@ -67,7 +68,7 @@ export function useOriginal(): boolean {
 
 export function setOriginal(shown: boolean): void {
   original = shown
-  globalThis.localStorage?.setItem(ORIGINAL, shown ? 'yes' : 'no')
+  keep(ORIGINAL, shown ? 'yes' : 'no')
   changed()
 }
 

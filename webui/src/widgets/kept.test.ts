@@ -1,0 +1,48 @@
+import '../testing/browser'
+import { expect, it, vi } from 'vitest'
+import { currentSession, keep as keepSession, mayHaveStop } from '../app/session'
+import { storedPlace, storePlace } from '../app/tour/steps'
+import type { Session } from '../api/schema'
+import { setLanguage } from '../i18n'
+import { subscribe } from '../live/store'
+import { useRemembered } from '../pages/motion/remembered'
+import { EMPTY, storedSetup, storeSetup } from '../pages/scope/setup'
+import { Shallow } from '../testing/shallow'
+import { setOriginal } from './profile-text/texts'
+
+const refuse = () => {
+  throw new DOMException('refused', 'SecurityError')
+}
+vi.stubGlobal('localStorage', { getItem: refuse, setItem: refuse, removeItem: refuse })
+vi.stubGlobal('sessionStorage', { getItem: refuse, setItem: refuse, removeItem: refuse })
+
+it('opens a session, with STOP, in a browser that keeps nothing', () => {
+  let reported = 0
+  const end = subscribe('session', () => reported++)
+  keepSession({ person: 'A', rights: [], csrf: null } as unknown as Session)
+  end()
+  expect([currentSession()?.person, reported]).toEqual(['A', 1])
+  expect(mayHaveStop()).toBe(true)
+})
+
+it('takes numbers and choices in a browser that keeps nothing', async () => {
+  const field = new Shallow(() => {
+    const [value, change] = useRemembered('x', 'jog.speed', 60)
+    return { value, change } as never
+  }, {})
+  const shown = () =>
+    (field as unknown as { tree: { value: number; change: (n: number) => void } }).tree
+  expect(shown().value).toBe(60)
+  await field.act(() => shown().change(30))
+  expect(shown().value).toBe(30)
+  expect(storedSetup()).toBeNull()
+  for (const act of [
+    () => storeSetup(EMPTY),
+    () => storePlace('left'),
+    () => setLanguage('en'),
+    () => setOriginal(true),
+  ]) {
+    expect(act).not.toThrow()
+  }
+  expect(storedPlace()).toBe('offer')
+})
