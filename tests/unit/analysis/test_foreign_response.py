@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import chirp
+from scipy.signal import chirp, lfilter
 
 from backend.analysis.response.excitation_found import find_excitation
 from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
@@ -171,6 +171,37 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(np.ones(5000), rng.normal(size=5000), RATE)
     with pytest.raises(NoResponse, match="too-short"):
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
+
+
+@pytest.mark.parametrize("kind", ["white", "random walk", "slow input", "chirp"])
+@pytest.mark.parametrize("n", [4000, 20000])
+def test_an_output_without_relation_to_the_input_has_no_response(kind: str, n: int) -> None:
+    """Of several hundred lines, some are coherent by chance: none of them is a response."""
+    rng = np.random.default_rng(7)
+    for _ in range(3):
+        u, y = rng.normal(size=n), rng.normal(size=n)
+        if kind == "random walk":
+            y = np.cumsum(y)
+        elif kind == "slow input":
+            u = lfilter([1.0], [1.0, -1.9, 0.905], u)
+        elif kind == "chirp":
+            u = chirp(np.arange(n) / RATE, 1.0, n / RATE, 300.0)
+        with pytest.raises(NoResponse, match="incoherent|few-lines"):
+            evaluate(u, y, RATE)
+
+
+def test_the_band_ends_where_the_output_no_longer_follows() -> None:
+    """An inertia whose motion sinks into the noise of its sensor at about 60 Hz."""
+    rng = np.random.default_rng(3)
+    n, rate = 20000, 1000.0
+    u = rng.normal(size=n)
+    speed = lfilter([0.0, 1.0], [1.0, -0.995], u)
+    for _ in range(4):
+        y = speed + 2.5 * rng.normal(size=n)
+        found = evaluate(u, y, rate)
+        assert found.valid_band_hz[1] < 150.0
+        # A rigid axis: what stands out where nothing is known is not a mode.
+        assert found.modes == ()
 
 
 @pytest.mark.parametrize("periods", [1, 8])
