@@ -380,12 +380,28 @@ def _fitted(lines: _Lines) -> ProductFit | None:
     if np.count_nonzero(use) < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(lines.coherence)))
     weight = 1.0 / np.hypot(lines.noise, 0.03)
-    found = fit_product(lines.frequency_hz[use], lines.response[use], weight[use])
+    fitted = np.flatnonzero(use)
+    if lines.independent:
+        fitted = _spread(lines.frequency_hz, fitted)
+    found = fit_product(lines.frequency_hz[fitted], lines.response[fitted], weight[fitted])
     if found is None:
         return None
     model = found.model
     left = np.log(lines.response / model.response(lines.frequency_hz))
     return replace(found, residual=np.asarray(left))
+
+
+def _spread(f: FloatArray, use: IntArray) -> IntArray:
+    """Of the lines ``use``, as many as tell a model apart: half evenly spaced, half by octaves.
+
+    A long period has tens of thousands of lines, and the fit takes time for each.
+    """
+    if use.size <= threshold.LINES:
+        return use
+    half = threshold.LINES // 2
+    even = np.linspace(0, use.size - 1, half).round().astype(np.int64)
+    octaves = np.searchsorted(f[use], np.geomspace(f[use[0]], f[use[-1]], half))
+    return np.asarray(use[np.unique(np.concatenate([even, np.clip(octaves, 0, use.size - 1)]))])
 
 
 def _known(lines: _Lines) -> BoolArray:

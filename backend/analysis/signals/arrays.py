@@ -43,6 +43,4 @@ def running_mean(x: FloatArray, first: int, width: int) -> FloatArray:
     """
     sums = np.concatenate([[0.0], np.cumsum(x)])
     at = np.arange(x.size) - first
-    return np.asarray(
-        (sums[np.clip(at + width, 0, x.size)] - sums[np.clip(at, 0, x.size)]) / width
-    )
+    return np.asarray((sums[np.clip(at + width, 0, x.size)] - sums[np.clip(at, 0, x.size)]) / width)
