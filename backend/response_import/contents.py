@@ -269,12 +269,15 @@ def _scope_names(
         # Between blanks, a name with a blank in it moves the names after it.
         if cells and (layout.separator is not None or len(cells) == layout.width):
             found[cells[0]] = [*cells, *("",) * layout.width][: layout.width]
-    named = found.get("Name")
+    named = found.get("Name") or found.get("SymbolName")
     if named is None or "SampleTime[ms]" not in keys:
         return None
-    units, names, clocks, clock = found.get("Unit", [""] * layout.width), [], [], 0
+    units = found.get("Unit", [""] * layout.width)
+    names: list[str] = []
+    clocks: list[int] = []
+    clock = 0
     for i, (cell, unit) in enumerate(zip(named, units, strict=True)):
-        clock = i if cell == "Name" else clock
+        clock = i if cell == named[0] else clock
         shown = "" if unit in {"", "(None)"} else f" [{unit.split(' (')[0]}]"
         names.append("Time [ms]" if i == clock else (cell or f"column {i + 1}") + shown)
         clocks.append(clock)
@@ -290,7 +293,9 @@ def codesys_trace(lines: list[str], name: str) -> Table:
     Raises:
         BadRecording: no channel, or a sample that is no pair of numbers.
     """
-    names, times, values = [], [], []
+    names: list[str] = []
+    times: list[list[float]] = []
+    values: list[list[float]] = []
     for at, line in enumerate(lines[1:], start=2):
         cells = [cell.strip() for cell in line.split(";")]
         if cells[0].endswith(".Variable") and len(cells) > 1:
@@ -305,17 +310,16 @@ def codesys_trace(lines: list[str], name: str) -> Table:
                 raise BadRecording(
                     "import.line-column-no-number", value=cell[:40], name=name, first=at, j=j + 1
                 )
-            into.append(float(cell))
+            into.append(float(re.sub("[dD]", "e", cell)))
     if not names or not max(map(len, times)):
         raise BadRecording(
             "import.holds-no-table-numbers", value=name, head_lines=_HEAD_LINES, first=lines[0]
         )
-    longest = max(map(len, times))
-    filled = [
-        np.array([*row, *(np.nan,) * (longest - len(row))])
-        for pair in zip(times, values, strict=True)
-        for row in pair
-    ]
+    if 2 * len(names) > MAX_COLUMNS:
+        raise BadRecording(
+            "import.columns", value=2 * len(names), limit=str(MAX_COLUMNS), name=name
+        )
+    filled = [np.array(row) for pair in zip(times, values, strict=True) for row in pair]
     shown = [each for own in names for each in ("Time", own)]
     clocks = [2 * (i // 2) for i in range(len(shown))]
     # One clock of all channels is one column.

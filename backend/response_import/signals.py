@@ -209,9 +209,9 @@ def _same_clock(
     time = table.columns[own[0] if at is None else at][:rows]
     usual = float(np.median(np.abs(np.diff(time))))
     for i, clock in zip(signals, own, strict=True):
-        apart = np.abs(table.columns[clock][:rows] - time)
-        # A clock that has ended is none of the rows after it.
-        if clock != at and not np.all(apart <= _JITTER * usual):
+        times = table.columns[clock][:rows]
+        alike = times.size == rows and np.all(np.abs(times - time) <= _JITTER * usual)
+        if clock != at and not alike:
             raise BadRecording(
                 "import.other-times",
                 parameter="time",

@@ -139,6 +139,13 @@ def test_a_newer_scope_export_has_names_far_above_its_table_and_a_last_line() ->
     check(signals_of(table, "scope.csv", time="3", signal_in="Torque", signal_out="Velocity"))
 
 
+def test_a_scope_export_between_blanks_has_the_names_that_hold_no_blank() -> None:
+    data = scope_3(T * 1e3, "1").replace(b"Torque;Name", b"Motor torque;Name").replace(b";", b" ")
+    table = read_table(data, "scope.csv")
+    assert table.names == ("Time [ms]", "MAIN.x", "Time [ms]", "MAIN.x", "MAIN.x")
+    check(signals_of(table, "scope.csv", time="1", signal_in="2", signal_out="4"))
+
+
 def test_channels_of_a_scope_at_other_times_are_not_one_recording() -> None:
     """Rows of two rates side by side: input and output of a row belong to different moments."""
     table = read_table(scope_3(T * 200.0, "0.2"), "scope.csv")
@@ -160,11 +167,11 @@ def test_a_column_with_fewer_rows_was_sampled_at_another_rate() -> None:
         read("t,in,out\n" + "\n".join(rows))
 
 
-def codesys(times: np.ndarray) -> bytes:
+def codesys(times: np.ndarray, later: float = 0.0) -> bytes:
     text = "[key]; [value]\nVersion; 0x03050000\nName; Trace\n"
     for i, (name, values) in enumerate((("Drive.Torque", U), ("Drive.Speed", Y))):
         text += f"{i}.Variable; {name}\n{i}.Class; 14\n{i}.Data; \n"
-        text += "".join(f"; {t:g}; {v}\n" for t, v in zip(times + i * 0, values, strict=True))
+        text += "".join(f"; {t:g}; {v}\n" for t, v in zip(times + i * later, values, strict=True))
     return text.encode()
 
 
@@ -177,6 +184,10 @@ def test_a_codesys_trace_has_its_channels_one_below_the_other() -> None:
     with pytest.raises(BadRecording, match="1 Hz") as error:
         signals_of(table, "trace.csv", **used)
     assert error.value.remedy
+    apart = read_table(codesys(np.arange(N) + 2.0, 0.5), "trace.csv")
+    assert apart.names == ("Time", "Drive.Torque", "Time", "Drive.Speed")
+    with pytest.raises(BadRecording, match="not sampled at the times given"):
+        signals_of(apart, "trace.csv", **{**used, "time": "1"}, time_unit="ms")
     broken = codesys(np.arange(N) + 2.0).replace(b"; 5; ", b"; 5; x", 1)
     with pytest.raises(BadRecording, match="line 10, column 3"):
         read_table(broken, "trace.csv")
