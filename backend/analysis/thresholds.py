@@ -846,6 +846,14 @@ class foreign:
     COHERENT = 0.5
     """[ratio] Lines less coherent than this are left out of the fit, and end the band. Origin:
     855a6a86."""
+    # KNOWN, MOST_OF_A_LINE: The output follows the input where the squares of the lines over their
+    # variances exceed the first in the mean over neighbours; a single line counts up to the second.
+    # Without any relation that mean is 1.1 with a deviation of 0.4; 4 is a noise of 0.35 per
+    # component.
+    KNOWN = 4.0
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
+    MOST_OF_A_LINE = 16.0
+    """[ratio] Origin: tests/unit/analysis/test_foreign_response.py."""
     FEWEST_EMPTY = 8
     """[count] Empty lines that show distortion, at least. Origin: 855a6a86."""
     POOL_EMPTY = 8

@@ -7,10 +7,12 @@ MATLAB: up to v7. A file that is too large is refused before it is unpacked in m
 
 from __future__ import annotations
 
+import csv
 import gzip
 import io
 import re
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +30,10 @@ MAX_ROWS, MAX_COLUMNS = 4_000_000, 256
 #: The table must begin within this number of lines.
 _HEAD_LINES = 400
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][+-]?\d+)?$")
+#: First line of a trace of CODESYS, without blanks; its values of a switch.
+_CODESYS = "[key];[value]"
+_SWITCH = {"true": "1", "false": "0"}
+_WORD = re.compile(r"[^\W\d][^\W\d ]*$")
 _MISSING = {"", "nan", "-nan", "inf", "-inf", "+inf", "null", "n/a", "#n/a", "none", "-", "1.#qnan"}
 
 
@@ -37,7 +43,8 @@ class Table:
 
     ``columns``: in the order of the file, with ``names``; NaN in empty cells. ``first_line``: line
     of the file with the first row, 0 for files without lines. ``facts``: pairs of name and value
-    from the lines before the table, such as a sample time.
+    from the lines before the table, such as a sample time. ``clocks``: for each column the index
+    of its own time column, where the file has one for each channel.
     """
 
     names: tuple[str, ...]
@@ -45,6 +52,7 @@ class Table:
     first_line: int
     form: str
     facts: tuple[tuple[str, str], ...] = ()
+    clocks: tuple[int, ...] = ()
 
     @property
     def rows(self) -> int:
@@ -140,7 +148,11 @@ def _as(data: bytes, encoding: str, name: str) -> str:
 
 
 def _split(line: str, separator: str | None) -> list[str]:
-    cells = line.split(separator) if separator is not None else line.split()
+    cells = line.split(separator)
+    if separator is not None and '"' in line:
+        # A separator between quotes is part of the number: "0,25","1,5".
+        with suppress(csv.Error):
+            cells = next(csv.reader([line], delimiter=separator), [])
     return [cell.strip().strip('"').strip() for cell in cells]
 
 
@@ -166,7 +178,7 @@ def _layout(lines: list[str], name: str) -> _Layout:
     best: tuple[int, int, _Layout] | None = None
     for separator, comma in (
         ("\t", False), ("\t", True), (";", False), (";", True), (",", False), (None, False),
-        (None, True), ("|", False),
+        (None, True), ("|", False), (",", True),
     ):  # fmt: skip
         run = _longest_run(lines, separator, comma)
         if run is None:
@@ -214,6 +226,8 @@ def _longest_run(
 def _from_text(text: str, name: str) -> Table:
     # Split at line ends only: other characters at which `splitlines` splits occur in units.
     lines = re.split(r"\r\n|\n|\r", text)
+    if lines[0].replace(" ", "").lower() == _CODESYS:
+        return codesys_trace(lines, name)
     if len(lines) > MAX_ROWS + _HEAD_LINES:
         raise BadRecording(
             "import.lines",
@@ -225,11 +239,94 @@ def _from_text(text: str, name: str) -> Table:
     if layout.width > MAX_COLUMNS:
         raise BadRecording("import.columns", value=layout.width, limit=str(MAX_COLUMNS), name=name)
     rows = lines[layout.first :]
-    while rows and not rows[-1].strip():
+    while rows and _no_row(rows[-1], layout):
         rows.pop()
     columns = _numbers(rows, layout, name)
-    names = _names(lines[: layout.first], layout)
-    return Table(names, columns, layout.first + 1, _form(layout), _facts(lines[: layout.first]))
+    head = lines[: layout.first]
+    names, clocks = _scope_names(head, layout) or (_names(head, layout), ())
+    return Table(names, columns, layout.first + 1, _form(layout), _facts(head), clocks)
+
+
+def _no_row(line: str, layout: _Layout) -> bool:
+    """Whether a line at the end is none of the table: empty, or one word such as EOF."""
+    cells = [cell for cell in _split(line, layout.separator) if cell]
+    return not cells or (len(cells) == 1 and _WORD.match(cells[0]) is not None)
+
+
+def _scope_names(
+    head: list[str], layout: _Layout
+) -> tuple[tuple[str, ...], tuple[int, ...]] | None:
+    """Column names and clocks of an export of TwinCAT Scope; None where it is none.
+
+    Each line of its head repeats its key in the time columns (InfoSys TE13xx, "Export to CSV"):
+    channels with the same times follow one time column. Times are in milliseconds.
+    """
+    found: dict[str, list[str]] = {}
+    keys = set()
+    for line in head:
+        cells = _split(line, layout.separator)
+        keys.update(cells[:1])
+        # Between blanks, a name with a blank in it moves the names after it.
+        if cells and (layout.separator is not None or len(cells) == layout.width):
+            found[cells[0]] = [*cells, *("",) * layout.width][: layout.width]
+    named = found.get("Name") or found.get("SymbolName")
+    if named is None or "SampleTime[ms]" not in keys:
+        return None
+    units = found.get("Unit", [""] * layout.width)
+    names: list[str] = []
+    clocks: list[int] = []
+    clock = 0
+    for i, (cell, unit) in enumerate(zip(named, units, strict=True)):
+        clock = i if cell == named[0] else clock
+        shown = "" if unit in {"", "(None)"} else f" [{unit.split(' (')[0]}]"
+        names.append("Time [ms]" if i == clock else (cell or f"column {i + 1}") + shown)
+        clocks.append(clock)
+    return tuple(names), tuple(clocks)
+
+
+def codesys_trace(lines: list[str], name: str) -> Table:
+    """Table of a trace of CODESYS, which has its channels one below the other.
+
+    Each has lines ``N.Variable; name`` and ``N.Data;``, then its samples ``; time; value``. The
+    file does not state the unit of the times.
+
+    Raises:
+        BadRecording: no channel, or a sample that is no pair of numbers.
+    """
+    names: list[str] = []
+    times: list[list[float]] = []
+    values: list[list[float]] = []
+    for at, line in enumerate(lines[1:], start=2):
+        cells = [cell.strip() for cell in line.split(";")]
+        if cells[0].endswith(".Variable") and len(cells) > 1:
+            names.append(cells[1])
+            times.append([])
+            values.append([])
+        if cells[0] or len(cells) < 2 or not names:
+            continue
+        for j, into in ((1, times[-1]), (2, values[-1])):
+            cell = _SWITCH.get(cells[j].lower(), cells[j]) if j < len(cells) else ""
+            if not _is_number(cell, False):
+                raise BadRecording(
+                    "import.line-column-no-number", value=cell[:40], name=name, first=at, j=j + 1
+                )
+            into.append(float(re.sub("[dD]", "e", cell)))
+    if not names or not max(map(len, times)):
+        raise BadRecording(
+            "import.holds-no-table-numbers", value=name, head_lines=_HEAD_LINES, first=lines[0]
+        )
+    if 2 * len(names) > MAX_COLUMNS:
+        raise BadRecording(
+            "import.columns", value=2 * len(names), limit=str(MAX_COLUMNS), name=name
+        )
+    filled = [np.array(row) for pair in zip(times, values, strict=True) for row in pair]
+    shown = [each for own in names for each in ("Time", own)]
+    clocks = [2 * (i // 2) for i in range(len(shown))]
+    # One clock of all channels is one column.
+    if all(row == times[0] for row in times):
+        filled, shown = [filled[0], *filled[1::2]], ["Time", *names]
+        clocks = [0] * len(shown)
+    return Table(tuple(shown), tuple(filled), 0, "CODESYS trace", (), tuple(clocks))
 
 
 def _form(layout: _Layout) -> str:

@@ -110,13 +110,26 @@ def _collect(
 ) -> None:
     if len(names) >= _MOST or not isinstance(value, np.ndarray) or depth > 6:
         return
-    if value.dtype.names and value.size == 1:
-        for field in value.dtype.names:
-            _collect(f"{key}.{field}", value.flat[0][field], names, columns, depth + 1)
-    elif value.dtype == object and value.size == 1:
-        _collect(key, value.flat[0], names, columns, depth + 1)
-    elif value.dtype.kind in "iufb" and value.ndim == 2 and value.size > 1:
+    if value.dtype.names:
+        # Objects of classes are stored elsewhere in the file; these are references to them.
+        if set(value.dtype.names) == {"s0", "s1", "s2", "arr"}:
+            return
+        for i, each in enumerate(value.flat[:_MOST]):
+            own = key if value.size == 1 else f"{key}({i + 1}){_label(each)}"
+            for field in value.dtype.names:
+                _collect(f"{own}.{field}", each[field], names, columns, depth + 1)
+    elif value.dtype == object:
+        for i, each in enumerate(value.flat[:_MOST]):
+            own = key if value.size == 1 else f"{key}{{{i + 1}}}"
+            _collect(own, each, names, columns, depth + 1)
+    elif value.dtype.kind in "iufb" and value.ndim >= 2 and value.size > 1:
         numbers = np.asarray(value, dtype=np.float64)
+        if numbers.ndim > 2:
+            # Simulink: channels × 1 × samples.
+            numbers = np.squeeze(numbers)
+            numbers = numbers[None, :] if numbers.ndim == 1 else numbers
+            if numbers.ndim > 2:
+                return
         if 1 in numbers.shape:
             names.append(key)
             columns.append(numbers.ravel())
@@ -125,3 +138,13 @@ def _collect(
         for i in range(min(rows.shape[1], _MOST)):
             names.append(f"{key}(:,{i + 1})" if rows is numbers else f"{key}({i + 1},:)")
             columns.append(np.ascontiguousarray(rows[:, i]))
+
+
+def _label(element: Any) -> str:
+    """Name of a channel in an array of structures, as dSPACE and Simulink write it."""
+    for field in ("Name", "name", "label", "blockName"):
+        if field in (element.dtype.names or ()):
+            value = np.asarray(element[field])
+            if value.dtype.kind == "U" and value.size == 1 and str(value.flat[0]).strip():
+                return f" {str(value.flat[0]).strip()[:64]}"
+    return ""

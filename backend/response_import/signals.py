@@ -25,6 +25,9 @@ _PATTERN = 0.5
 #: A sample is lost where the times after a step are later by this share of a step than those before
 #: it, in the median over this number of samples on each side.
 _LOST, _BESIDE = 0.5, 12
+#: Columns that end before this share of the longest were sampled at another rate: one channel of a
+#: scope ends some rows before another, half the rate ends at half the rows.
+_SHORTER = 0.75
 #: Range of plausible sampling rates for a recording of an axis.
 _SLOWEST_HZ, _FASTEST_HZ = 10.0, 10e6
 #: Factors to seconds.
@@ -123,6 +126,7 @@ def signals_of(
         )
     used = [i for i in (at, first, second) if i is not None]
     columns = _complete(table, used, name)
+    _same_clock(table, at, (first, second), columns[-1].size, name)
     u, y = columns[-2], columns[-1]
     for use, values, column in (("input", u, first), ("output", y, second)):
         if float(np.ptp(values)) == 0.0:
@@ -166,6 +170,9 @@ def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
             raise BadRecording("import.column-holds-no-numbers", value=table.names[i], name=name)
         ends.append(int(good[-1]) + 1)
     end = min(ends)
+    if table.form != "MAT" and end < _SHORTER * max(ends):
+        sizes = ", ".join(f"{table.names[i]} {size}" for i, size in zip(used, ends, strict=True))
+        raise BadRecording("import.columns-differ-length", value=sizes, name=name)
     if table.form == "MAT" and len({v.size for v in columns}) > 1:
         sizes = ", ".join(f"{table.names[i]} {table.columns[i].size}" for i in used)
         raise BadRecording("import.vectors-differ-length", value=sizes, name=name)
@@ -190,6 +197,30 @@ def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
                 bad_size=bad.size,
             )
     return [np.asarray(v[:end], dtype=np.float64) for v in columns]
+
+
+def _same_clock(
+    table: Table, at: int | None, signals: tuple[int, int], rows: int, name: str
+) -> None:
+    """Check that both signals were sampled at the same times, where each has its own times."""
+    if not table.clocks:
+        return
+    own = [table.clocks[i] for i in signals]
+    time = table.columns[own[0] if at is None else at][:rows]
+    usual = float(np.median(np.abs(np.diff(time))))
+    for i, clock in zip(signals, own, strict=True):
+        times = table.columns[clock][:rows]
+        alike = times.size == rows and np.all(np.abs(times - time) <= _JITTER * usual)
+        if clock != at and not alike:
+            raise BadRecording(
+                "import.other-times",
+                parameter="time",
+                value=table.names[i],
+                limit=text("limit.one-of-columns", numbers=str(clock + 1)),
+                name=name,
+                names=table.names[i],
+                clock=clock + 1,
+            )
 
 
 def _check_rate(rate: float, name: str, what: str) -> None:

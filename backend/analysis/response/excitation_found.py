@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray
+from backend.analysis.signals.arrays import BoolArray, FloatArray, IntArray, running_mean
 from backend.analysis.thresholds import excitation_found as threshold
 
 Excited = Literal["periodic", "chirp", "noise"]
@@ -58,7 +58,7 @@ def _loud(u: FloatArray) -> tuple[int, int]:
     A recording usually begins before its excitation, and ends after it.
     """
     width = max(u.size // threshold.PARTS, 8)
-    power = np.convolve(u**2, np.full(width, 1.0 / width), "same")
+    power = running_mean(u**2, width // 2, width)
     loud = power > threshold.SILENT**2 * float(np.percentile(power, 90))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], loud, [False]]).astype(np.int8)))
     begins, ends = edges[::2], edges[1::2]

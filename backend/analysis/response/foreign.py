@@ -18,12 +18,14 @@ from backend.analysis.response.modes_found import FoundMode, modes_of
 from backend.analysis.response.product_model import ProductFit, fit_product
 from backend.analysis.response.repeat_band import RepeatBand, line_scatter, repeat_band
 from backend.analysis.signals.arrays import (
+    BoolArray,
     ComplexArray,
     FloatArray,
     IntArray,
     magnitude_db,
     neighbour_mean,
     phase_deg,
+    running_mean,
 )
 from backend.analysis.thresholds import foreign as threshold
 
@@ -301,7 +303,7 @@ def _by_window(u: FloatArray, y: FloatArray, rate: float) -> _Lines:
     spectra = [np.fft.rfft(x - np.mean(x)) for x in (u, y)]
     power = np.abs(spectra[0]) ** 2
     reach = max(round(n / rate), 8)
-    level = 10.0 * np.log10(neighbour_mean(power, reach) + 1e-300)
+    level = 10.0 * np.log10(np.maximum(running_mean(power, reach, 2 * reach + 1), 0.0) + 1e-300)
     usable = np.arange(8, power.size - 8)
     strong = usable[level[usable] > np.max(level[usable]) + threshold.EXCITED_DB]
     if strong.size < LEAST_LINES:
@@ -344,7 +346,8 @@ def _with_band(lines: _Lines) -> ForeignResponse:
     return ForeignResponse(
         f, g, np.asarray(coherence), lines.noise,
         np.sqrt(np.maximum(scatter**2 - lines.noise**2, 0.0)), band, fit, modes, "noise",
-        "local polynomial", lines.period_s, lines.used, lines.dropped, _band_hz(f, coherence),
+        "local polynomial", lines.period_s, lines.used, lines.dropped,
+        _band_hz(lines, np.asarray(coherence)),
         0.0, lines.empty.sizes() if lines.empty is not None else (None, None),
     )  # fmt: skip
 
@@ -369,12 +372,18 @@ def _with_feedback(band: RepeatBand, coherence: FloatArray) -> RepeatBand:
 
 def _fitted(lines: _Lines) -> ProductFit | None:
     use = (
-        (lines.coherence > threshold.COHERENT) & (lines.noise < 0.5) & (np.abs(lines.response) > 0)
+        (lines.coherence > threshold.COHERENT)
+        & (lines.noise < 0.5)
+        & (np.abs(lines.response) > 0)
+        & _known(lines)
     )
     if np.count_nonzero(use) < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(lines.coherence)))
     weight = 1.0 / np.hypot(lines.noise, 0.03)
-    found = fit_product(lines.frequency_hz[use], lines.response[use], weight[use])
+    fitted = np.flatnonzero(use)
+    if lines.independent:
+        fitted = _spread(lines.frequency_hz, fitted)
+    found = fit_product(lines.frequency_hz[fitted], lines.response[fitted], weight[fitted])
     if found is None:
         return None
     model = found.model
@@ -382,9 +391,36 @@ def _fitted(lines: _Lines) -> ProductFit | None:
     return replace(found, residual=np.asarray(left))
 
 
-def _band_hz(f: FloatArray, coherence: FloatArray) -> tuple[float, float]:
-    """First and last coherent line, Hz."""
-    good = np.flatnonzero(coherence > threshold.COHERENT)
+def _spread(f: FloatArray, use: IntArray) -> IntArray:
+    """Of the lines ``use``, as many as tell a model apart: half evenly spaced, half by octaves.
+
+    A long period has tens of thousands of lines, and the fit takes time for each.
+    """
+    if use.size <= threshold.LINES:
+        return use
+    half = threshold.LINES // 2
+    even = np.linspace(0, use.size - 1, half).round().astype(np.int64)
+    octaves = np.searchsorted(f[use], np.geomspace(f[use[0]], f[use[-1]], half))
+    return np.asarray(use[np.unique(np.concatenate([even, np.clip(octaves, 0, use.size - 1)]))])
+
+
+def _known(lines: _Lines) -> BoolArray:
+    """Lines [lines] near which the output follows the input.
+
+    Where it does not, the square of each line over its variance is of the size of 1 (exponentially
+    distributed), and exceeds the limit by chance on some of several hundred lines. The mean over
+    neighbours does not. Lines of a repeated period have their noise from the periods instead.
+    """
+    if lines.independent:
+        return np.ones(lines.frequency_hz.size, dtype=np.bool_)
+    squared = np.minimum(0.5 / np.maximum(lines.noise, 1e-6) ** 2, threshold.MOST_OF_A_LINE)
+    return np.asarray(neighbour_mean(squared, threshold.POOL_EMPTY) > threshold.KNOWN)
+
+
+def _band_hz(lines: _Lines, coherence: FloatArray) -> tuple[float, float]:
+    """First and last coherent line among those that are known, Hz."""
+    f = lines.frequency_hz
+    good = np.flatnonzero((coherence > threshold.COHERENT) & _known(lines))
     if good.size < LEAST_LINES:
         raise NoResponse("incoherent", coherence=float(np.median(coherence)))
     return float(f[good[0]]), float(f[good[-1]])

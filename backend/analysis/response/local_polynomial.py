@@ -71,12 +71,15 @@ def smooth_residual(values: ComplexArray, reach: int) -> tuple[ComplexArray, Flo
     reach = min(reach, max((n - 1) // 2, 1))
     order = min(_ORDER, 2 * reach - 1)
     left, kept = np.empty(n, dtype=np.complex128), np.empty(n)
+    width = min(2 * reach + 1, n)
+    rows = [
+        np.linalg.pinv(np.vander((np.arange(width) - own) / reach, order + 1, increasing=True))[0]
+        for own in range(width)
+    ]
     for i in range(n):
-        first = min(max(i - reach, 0), max(n - 2 * reach - 1, 0))
-        k = np.arange(first, min(first + 2 * reach + 1, n))
-        basis = np.vander((k - i) / reach, order + 1, increasing=True)
-        row = np.linalg.pinv(basis)[0]
-        left[i] = values[i] - row @ values[k]
+        first = min(max(i - reach, 0), n - width)
+        row = rows[i - first]
+        left[i] = values[i] - row @ values[first : first + width]
         own = float(row[i - first])
         kept[i] = 1.0 - 2.0 * own + float(np.sum(row**2))
     return left, kept

@@ -34,3 +34,13 @@ def neighbour_mean(x: FloatArray, reach: int) -> FloatArray:
         if x.size >= width
         else np.full(x.size, np.mean(x))
     )
+
+
+def running_mean(x: FloatArray, first: int, width: int) -> FloatArray:
+    """Mean of ``width`` values from ``first`` before each, in one pass; zeros beyond the ends.
+
+    Rounding is that of the sum of all ``x``: for values that are compared with the largest ones.
+    """
+    sums = np.concatenate([[0.0], np.cumsum(x)])
+    at = np.arange(x.size) - first
+    return np.asarray((sums[np.clip(at + width, 0, x.size)] - sums[np.clip(at, 0, x.size)]) / width)

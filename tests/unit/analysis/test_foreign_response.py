@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import gzip
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import chirp
+from scipy.signal import chirp, cont2discrete, lfilter
 
 from backend.analysis.response.excitation_found import find_excitation
 from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
@@ -160,6 +161,26 @@ def test_periods_of_any_length_and_a_measured_input_are_found() -> None:
     assert find_excitation(np.random.default_rng(4).normal(size=4000)).kind == "noise"
 
 
+def test_a_long_period_is_evaluated_within_ten_seconds_of_processor_time() -> None:
+    """Four thousand lines of a two-mass axis in state space, the torque held for each sample."""
+    rate, period = 2000.0, 8000
+    rng = np.random.default_rng(5)
+    u = np.tile(rng.normal(size=period), 4)
+    zeros, poles = 2 * np.pi * 60.0, 2 * np.pi * 80.0
+    top = np.array([zeros**-2, 0.04 / zeros, 1.0])
+    below = np.polymul([1.0, 1.0], [poles**-2, 0.04 / poles, 1.0])
+    b, a, _ = cont2discrete((top, below), 1 / rate)
+    y = lfilter(b.ravel(), a, u)
+    y += 0.01 * np.std(y) * rng.normal(size=y.size)
+    begin = time.process_time()
+    found = evaluate(u, y, rate)
+    assert time.process_time() - begin < 10.0
+    assert found.frequency_hz.size > 3000
+    kinds = {m.row.kind: m.row.frequency_hz for m in found.modes}
+    assert kinds["antiresonance"] == pytest.approx(60.0, rel=0.01)
+    assert kinds["resonance"] == pytest.approx(80.0, rel=0.01)
+
+
 def test_what_supports_no_answer_says_why() -> None:
     rng = np.random.default_rng(1)
     with pytest.raises(NoResponse, match="incoherent"):
@@ -171,6 +192,37 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(np.ones(5000), rng.normal(size=5000), RATE)
     with pytest.raises(NoResponse, match="too-short"):
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
+
+
+@pytest.mark.parametrize("kind", ["white", "random walk", "slow input", "chirp"])
+@pytest.mark.parametrize("n", [4000, 20000])
+def test_an_output_without_relation_to_the_input_has_no_response(kind: str, n: int) -> None:
+    """Of several hundred lines, some are coherent by chance: none of them is a response."""
+    rng = np.random.default_rng(7)
+    for _ in range(3):
+        u, y = rng.normal(size=n), rng.normal(size=n)
+        if kind == "random walk":
+            y = np.cumsum(y)
+        elif kind == "slow input":
+            u = lfilter([1.0], [1.0, -1.9, 0.905], u)
+        elif kind == "chirp":
+            u = chirp(np.arange(n) / RATE, 1.0, n / RATE, 300.0)
+        with pytest.raises(NoResponse, match=r"incoherent|few-lines"):
+            evaluate(u, y, RATE)
+
+
+def test_the_band_ends_where_the_output_no_longer_follows() -> None:
+    """An inertia whose motion sinks into the noise of its sensor at about 60 Hz."""
+    rng = np.random.default_rng(3)
+    n, rate = 20000, 1000.0
+    u = rng.normal(size=n)
+    speed = lfilter([0.0, 1.0], [1.0, -0.995], u)
+    for _ in range(4):
+        y = speed + 2.5 * rng.normal(size=n)
+        found = evaluate(u, y, rate)
+        assert found.valid_band_hz[1] < 150.0
+        # A rigid axis: what stands out where nothing is known is not a mode.
+        assert found.modes == ()
 
 
 @pytest.mark.parametrize("periods", [1, 8])

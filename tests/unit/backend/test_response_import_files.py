@@ -73,6 +73,13 @@ TWINCAT = (
         pytest.param(text("\t"), id="tab"),
         pytest.param(text(";", comma=True), id="German Excel"),
         pytest.param(text("\t", comma=True), id="tab, decimal comma"),
+        pytest.param(
+            "\n".join(
+                ",".join(f'"{cell}"' for cell in line.split(";"))
+                for line in text(";", comma=True).splitlines()
+            ),
+            id="decimal comma between quotes",
+        ),
         pytest.param(text(head=""), id="no names"),
         pytest.param(text(" ", head="# t u y\n"), id="blanks"),
         pytest.param(text().replace("\n", "\r\n"), id="CRLF"),
@@ -102,11 +109,88 @@ def test_columns_by_name_without_its_unit_and_by_number() -> None:
 def test_a_twincat_scope_export_has_a_time_for_each_channel() -> None:
     rows = "".join(f"{t:g}\t{u}\t{t:g}\t{y}\n" for t, u, y in zip(T * 1e3, U, Y, strict=True))
     table = read_table((TWINCAT + rows).encode(), "scope.csv")
-    assert [n.split(" ")[0] for n in table.names] == ["Name", "Torque", "Name", "Velocity"]
-    found = signals_of(
-        table, "scope.csv", time="1", signal_in="Torque", signal_out="Velocity", time_unit="ms"
-    )
+    assert [n.split(" ")[0] for n in table.names] == ["Time", "Torque", "Time", "Velocity"]
+    found = signals_of(table, "scope.csv", time="1", signal_in="Torque", signal_out="Velocity")
+    assert found.time_unit == "ms"
     check(found)
+
+
+#: A newer Scope: seventeen lines in the head, channels of one rate behind one time, a last line.
+SCOPE_3 = (
+    "Name;bench\nFile;bench.csv\nStarttime of export;1;Monday;15:56:24.376\n\n\n"
+    "Name;Torque;Name;Velocity;Position\nSymbolComment;;SymbolComment;;\n"
+    "Data-Type;REAL64;Data-Type;REAL64;REAL64\nSampleTime[ms];{fast};SampleTime[ms];1;1\n"
+    + "".join(f"{key};0;{key};0;0\n" for key in ("VariableSize", "IndexGroup", "IndexOffset"))
+    + "SymbolName;MAIN.x;SymbolName;MAIN.x;MAIN.x\n"
+    + "".join(f"{key};0;{key};0;0\n" for key in ("NetID", "Port", "Offset", "ScaleFactor"))
+    + "BitMask;0xff;BitMask;0xff;0xff\nUnit;Nm (Torque);Unit;(None);(None)\n"
+    "Unit ScaleFactor;1;Unit ScaleFactor;1;1\nUnit Offset;0;Unit Offset;0;0\n\n"
+)
+
+
+def scope_3(times: np.ndarray, fast: str, end: str = "EOF\n") -> bytes:
+    rows = [f"{a:g};{u};{b:g};{y};0" for a, u, b, y in zip(times, U, T * 1e3, Y, strict=True)]
+    return ("\ufeff" + SCOPE_3.format(fast=fast) + "\n".join(rows) + "\n" + end).encode()
+
+
+def test_a_newer_scope_export_has_names_far_above_its_table_and_a_last_line() -> None:
+    table = read_table(scope_3(T * 1e3, "1"), "scope.csv")
+    assert table.names == ("Time [ms]", "Torque [Nm]", "Time [ms]", "Velocity", "Position")
+    check(signals_of(table, "scope.csv", time="3", signal_in="Torque", signal_out="Velocity"))
+
+
+def test_a_scope_export_between_blanks_has_the_names_that_hold_no_blank() -> None:
+    data = scope_3(T * 1e3, "1").replace(b"Torque;Name", b"Motor torque;Name").replace(b";", b" ")
+    table = read_table(data, "scope.csv")
+    assert table.names == ("Time [ms]", "MAIN.x", "Time [ms]", "MAIN.x", "MAIN.x")
+    check(signals_of(table, "scope.csv", time="1", signal_in="2", signal_out="4"))
+
+
+def test_channels_of_a_scope_at_other_times_are_not_one_recording() -> None:
+    """Rows of two rates side by side: input and output of a row belong to different moments."""
+    table = read_table(scope_3(T * 200.0, "0.2"), "scope.csv")
+    for time, rate in (("1", None), ("3", None), (None, 1000.0)):
+        with pytest.raises(BadRecording, match="not sampled at the times given") as error:
+            signals_of(
+                table, "scope.csv", time=time, signal_in="Torque", signal_out="Velocity",
+                sample_rate_hz=rate,
+            )  # fmt: skip
+        assert error.value.remedy
+
+
+def test_a_column_with_fewer_rows_was_sampled_at_another_rate() -> None:
+    rows = [
+        f"{t},{u},{Y[i] if i < N * 2 // 3 else ''}"
+        for i, (t, u) in enumerate(zip(T, U, strict=True))
+    ]
+    with pytest.raises(BadRecording, match="different numbers of rows"):
+        read("t,in,out\n" + "\n".join(rows))
+
+
+def codesys(times: np.ndarray, later: float = 0.0) -> bytes:
+    text = "[key]; [value]\nVersion; 0x03050000\nName; Trace\n"
+    for i, (name, values) in enumerate((("Drive.Torque", U), ("Drive.Speed", Y))):
+        text += f"{i}.Variable; {name}\n{i}.Class; 14\n{i}.Data; \n"
+        text += "".join(f"; {t:g}; {v}\n" for t, v in zip(times + i * later, values, strict=True))
+    return text.encode()
+
+
+def test_a_codesys_trace_has_its_channels_one_below_the_other() -> None:
+    table = read_table(codesys(np.arange(N) + 2.0), "trace.csv")
+    assert table.names == ("Time", "Drive.Torque", "Drive.Speed")
+    used = {"time": "Time", "signal_in": "Drive.Torque", "signal_out": "Drive.Speed"}
+    check(signals_of(table, "trace.csv", **used, time_unit="ms"))
+    # The file does not state its unit; seconds would be one sample each.
+    with pytest.raises(BadRecording, match="1 Hz") as error:
+        signals_of(table, "trace.csv", **used)
+    assert error.value.remedy
+    apart = read_table(codesys(np.arange(N) + 2.0, 0.5), "trace.csv")
+    assert apart.names == ("Time", "Drive.Torque", "Time", "Drive.Speed")
+    with pytest.raises(BadRecording, match="not sampled at the times given"):
+        signals_of(apart, "trace.csv", **{**used, "time": "1"}, time_unit="ms")
+    broken = codesys(np.arange(N) + 2.0).replace(b"; 5; ", b"; 5; x", 1)
+    with pytest.raises(BadRecording, match="line 10, column 3"):
+        read_table(broken, "trace.csv")
 
 
 def test_matlab_vectors_structures_and_matrices() -> None:
@@ -119,6 +203,24 @@ def test_matlab_vectors_structures_and_matrices() -> None:
             out = io.BytesIO()
             savemat(out, variables, do_compression=packed)
             check(read(out.getvalue()))
+
+
+def test_matlab_arrays_of_structures_cells_and_simulink() -> None:
+    channels = np.zeros(2, dtype=[("Name", object), ("Data", object)])
+    channels[:] = [("Torque", U), ("Speed", Y)]
+    of_block = np.zeros(2, dtype=[("values", object), ("label", object)])
+    of_block[:] = [(U[None, None, :], "Torque"), (Y[:, None], "Speed")]
+    cells = np.empty(3, dtype=object)
+    cells[:] = [T, U, Y]
+    for variables in (
+        {"X": {"Data": T}, "Y": channels},
+        {"out": {"time": T[:, None], "signals": of_block}},
+        {"c": cells},
+    ):
+        out = io.BytesIO()
+        savemat(out, variables)
+        check(read(out.getvalue()))
+    assert read_table(out.getvalue(), "x.mat").names == ("c{1}", "c{2}", "c{3}")
 
 
 def test_matlab_of_version_4() -> None:
