@@ -1,9 +1,10 @@
 """Parameter lists as CSV: export of a set, and import of lists from other tools.
 
 Accepted are lists with a heading (``key`` or ``index`` and ``subindex``, with ``raw`` or ``value``)
-and lists without one (``key, raw`` or ``index, subindex, raw``). The separator is a comma,
-semicolon or tabulator; lines that begin with ``#`` are comments. ``raw`` is the value as
-transferred; ``value`` is in the parameter's unit. A bad line does not affect the others.
+and lists without one (``key, raw`` or ``index, subindex, raw``), where a line with several numbers
+that differ is refused. The separator is a comma, semicolon or tabulator; lines that begin with
+``#`` are comments. ``raw`` is the value as transferred; ``value`` is in the parameter's unit. A bad
+line does not affect the others.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ _KEY = re.compile(r"(?:0x)?([0-9a-f]{4})(?:h?[:.\s_/-]\s*|sub)(?:0x)?([0-9a-f]{1
 _INDEX = re.compile(r"(?:0x([0-9a-f]{1,4})|([0-9a-f]{4})h?)", re.I)
 #: Line with the separator that a spreadsheet writes and expects in front of a list.
 _SEPARATOR_LINE = re.compile(r'"?sep=([,;\t])"?', re.I)
+_REMARK = re.compile(r"[#;/]")
+#: A further cell that begins with a number, whatever remark is behind it.
+_NUMBER = re.compile(r"\s*[+-]?(?:0x[0-9a-f]+|\d+(?:[.,]\d+)?)\s*(?:[#;/].*)?$", re.I | re.S)
 _SAME_UNIT = {"r/min": "rpm", "1/min": "rpm", "min-1": "rpm", "u/min": "rpm", "sec": "s"}
 _HEADINGS = {
     "key": {"key", "address", "object", "parameter", "id", "number"},
@@ -48,6 +52,8 @@ class _Columns:
     raw: int = -1
     value: int = -1
     unit: int = -1
+    guessed: bool = False
+    """Without a heading: a list of several axes has several numbers in a line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,10 +181,10 @@ def _headed(cells: list[str]) -> _Columns | None:
 def _bare(cells: list[str]) -> _Columns:
     """Columns of a list without heading: ``key, raw`` or ``index, subindex, raw``."""
     if cells and _KEY.fullmatch(cells[0].strip()):
-        return _Columns(key=0, raw=1)
+        return _Columns(key=0, raw=1, guessed=True)
     if cells and len(cells) >= 3 and _INDEX.fullmatch(cells[0].strip()):
-        return _Columns(index=0, subindex=1, raw=2)
-    return _Columns(key=0, raw=1)
+        return _Columns(index=0, subindex=1, raw=2, guessed=True)
+    return _Columns(key=0, raw=1, guessed=True)
 
 
 def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: str) -> Reading:
@@ -187,6 +193,12 @@ def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: s
 
     parameter = _parameter(cell(columns.key), cell(columns.index), cell(columns.subindex), profile)
     raw = cell(columns.raw)
+    if columns.guessed and raw:
+        numbers = [raw, *(each for each in cells[columns.raw + 1 :] if _NUMBER.match(each))]
+        if len({_REMARK.split(word)[0].strip() for word in numbers}) > 1:
+            # Of another axis, a limit, or the raw value in a further column.
+            words = ", ".join(word.strip()[:12] for word in numbers[:6])
+            raise Unsuitable(text("sets.line-several-numbers", key=parameter.key, words=words))
     if raw:
         return _made(parameter, _value(parameter, raw, separator))
     written = cell(columns.value)

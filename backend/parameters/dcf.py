@@ -14,6 +14,7 @@ from profiles.importer import (
     ImportFailed,
     ImportReport,
     export_dcf,
+    holds,
     read_dcf_identity,
     read_dcf_values,
 )
@@ -24,14 +25,18 @@ from profiles.schema import Profile, Raw
 def write_dcf(
     profile: Profile, rows: Iterable[Row], *, file_name: str, node_name: str, created: datetime
 ) -> tuple[str, int]:
-    """The file's text, and the number of rows left out because they have no object."""
+    """The file's text, and the number of rows left out.
+
+    They have no object, or are texts that the format cannot hold.
+    """
     values: dict[str, Raw] = {}
     left_out = 0
     for row in rows:
         parameter = profile.by_key.get(row.key)
         if row.raw is None:
             continue
-        if parameter is None or parameter.index is None or parameter.type == "OCTETS":
+        no_object = parameter is None or parameter.index is None or parameter.type == "OCTETS"
+        if no_object or not holds(row.raw):
             left_out += 1
         else:
             values[row.key] = row.raw

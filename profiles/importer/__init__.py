@@ -11,7 +11,7 @@ from profiles.importer.description import DescribedEntry, DescribedPdo, Descript
 from profiles.importer.dictionary import describe_dictionary
 from profiles.importer.eds import read_eds
 from profiles.importer.esi import EsiDevice, open_esi, read_device
-from profiles.importer.export_eds import export_dcf, export_eds
+from profiles.importer.export_eds import export_dcf, export_eds, holds
 from profiles.importer.export_esi import export_esi
 from profiles.importer.files import import_file, write_profile
 from profiles.importer.report import Finding, ImportFailed, ImportReport
@@ -34,6 +34,7 @@ __all__ = [
     "export_dcf",
     "export_eds",
     "export_esi",
+    "holds",
     "import_file",
     "is_dcf",
     "open_esi",

@@ -37,7 +37,7 @@ class ConfiguredValue:
 def is_dcf(data: bytes) -> bool:
     """Return whether the data look like a DCF or EDS: lists in other formats lack such sections."""
     start = data[:8192].lower()
-    if start[:2] in (b"\xff\xfe", b"\xfe\xff"):
+    if start[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\0" in start[:2]:  # UTF-16
         start = start.replace(b"\0", b"")
     return b"[fileinfo]" in start or b"[deviceinfo]" in start
 

@@ -40,6 +40,7 @@ from profiles.importer.values import (
 from profiles.schema import DataType, PdoMapping, Raw
 
 MAX_BYTES = 8 * 2**20
+_LAST_SUBINDEX = 254
 _DEFTYPE = re.compile(r"(?:0x)?([0-9a-f]{1,3})(?:sub([0-9a-f]{1,2}))?$")
 _MODULE = re.compile(r"m\d+|supportedmodules|dynamicchannels")
 
@@ -174,8 +175,9 @@ class _Entries:
             parent = Section(line)
         place = f"{self._name}:{parent.line} [{index:04X}]"
         compact = parse_number(parent.word("compactsubobj"), place, self._report)
-        if compact and 0 < compact <= 254 and not members:
-            return self._compact_object(index, parent, int(compact))
+        if compact and compact > 0 and not members:
+            # Subindex 255 is reserved (CiA 301): 255 counts subindex 0 as well.
+            return self._compact_object(index, parent, int(min(compact, _LAST_SUBINDEX)))
         if not members:
             return self._entry(index, 0, parent, parent, "")
         count = parse_number(parent.word("subnumber"), place, self._report)

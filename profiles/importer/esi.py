@@ -41,6 +41,7 @@ from profiles.importer.xml_tree import (
 )
 
 MAX_BYTES = 32 * 2**20
+_LARGEST_IDENTITY = 2**32 - 1
 _PDO_TAGS: tuple[tuple[str, Literal["rx", "tx"]], ...] = (("RxPdo", "rx"), ("TxPdo", "tx"))
 _ROOTS = {name.lower(): name for name in ("EtherCATInfo", "EtherCATInfoList", "EtherCATConfig")}
 
@@ -185,11 +186,22 @@ def _choice(file: EsiFile, number: int) -> EsiDevice:
     return EsiDevice(
         number=number,
         name=tidy(name) or f"device {number}",
-        vendor_id=whole_number(text_of(child(vendor, "Id")), place, file.report),
-        product_code=whole_number(attribute_of(kind, "ProductCode"), place, file.report),
-        revision=whole_number(attribute_of(kind, "RevisionNo"), place, file.report),
+        vendor_id=_identity(text_of(child(vendor, "Id")), "Id", place, file.report),
+        product_code=_identity(
+            attribute_of(kind, "ProductCode"), "ProductCode", place, file.report
+        ),
+        revision=_identity(attribute_of(kind, "RevisionNo"), "RevisionNo", place, file.report),
         has_control_word=_has_control_word(file, element),
     )
+
+
+def _identity(text: str, name: str, place: str, report: ImportReport) -> int | None:
+    """Return a number of the identity, which has 32 bits (1018h)."""
+    number = whole_number(text, place, report)
+    if number is not None and number > _LARGEST_IDENTITY:
+        report.left_out(place, "description.does-not-fit", name=name, value=number, type="UINT32")
+        return None
+    return number
 
 
 def _has_control_word(file: EsiFile, element: Element) -> bool:

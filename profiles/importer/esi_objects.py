@@ -91,9 +91,14 @@ class DictionaryReader:
             self._entry(index, named, title, info, element, place)
             for position, member in enumerate(members)
             for named, info in (_info_of(infos, position - skipped, member, names),)
-            # Subindex 0 only contains the count (CiA 301 clause 7.4.4).
-            if member.subindex > 0 or len(members) == 1
+            # Subindex 0 only contains the count (CiA 301 clause 7.4.4), as a byte. One of another
+            # type is a value of its own, such as 1004h:00.
+            if member.subindex > 0 or len(members) == 1 or self._is_value(member)
         ]
+
+    def _is_value(self, member: Member) -> bool:
+        kind = self._types.base(member.type, None) if member.type else None
+        return kind is not None and kind not in ("UINT8", "INT8", "BOOL")
 
     def _entry(
         self,

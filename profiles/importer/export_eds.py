@@ -42,6 +42,8 @@ def export_dcf(
 ) -> str:
     """Return a DCF: the same with ``ParameterValue`` for each key of ``values`` (clause 5.3).
 
+    Values for which `holds` is false are left out.
+
     ``reals_as_bits`` writes a REAL32 as the hexadecimal number of its bits, as some tools require;
     others require decimal.
     """
@@ -219,8 +221,8 @@ def _entry(parameter: Parameter, name: str, values: Mapping[str, Raw], pdos: _Pd
         f"DefaultValue={_value(parameter, pdos)}",
         f"PDOMapping={int(parameter.pdo != 'none')}",
     ]
-    if parameter.key in values and parameter.type != "OCTETS":
-        lines.append(f"ParameterValue={_text(str(values[parameter.key]))}")
+    if parameter.key in values and parameter.type != "OCTETS" and holds(values[parameter.key]):
+        lines.append(f"ParameterValue={values[parameter.key]}")
     if parameter.min_raw is not None:
         lines.append(f"LowLimit={parameter.min_raw}")
     if parameter.max_raw is not None:
@@ -262,6 +264,13 @@ def _value(parameter: Parameter, pdos: _Pdos) -> str:
     if default is None or parameter.type == "OCTETS":
         return ""
     return _text(str(default))
+
+
+def holds(value: Raw) -> bool:
+    """Return whether a value can be in a DCF without a change: a text in one line, not empty."""
+    return not isinstance(value, str) or (
+        value.isprintable() and value == value.strip() and value != ""
+    )
 
 
 def _text(text: str) -> str:

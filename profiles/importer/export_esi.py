@@ -316,6 +316,8 @@ def _mailbox(device: Element, rules: BringUp, profile: Profile) -> None:
     for protocol, tag in _PROTOCOLS.items():
         if protocol in protocols:
             SubElement(mailbox, tag)
+    if profile.bring_up is not None and "coe" not in protocols and not rules.init_commands:
+        return  # a station without CoE; objects of a profile without such rules are read by CoE
     coe = SubElement(mailbox, "CoE")
     complete = rules.coe.complete_access
     if complete is None and link is not None and link.complete_access:

@@ -88,7 +88,7 @@ _LONGEST_NUMBER = 40
 #: Start of an editor's remark after a value: text may contain both, numbers and words of the
 #: standard cannot. White space before it is not in the pattern: searching for it takes quadratic
 #: time in its length, and a file may contain a megabyte of it.
-_REMARK = re.compile(r";|//")
+_REMARK = re.compile(r";|//|(?<!\S)#(?![xX])")
 #: Fields of ESI and EDS files with an upper limit.
 _MAXIMA = ("MaxValue", "MaxData", "HighLimit")
 _REAL32_MAX = 3.4028234e38

@@ -5,7 +5,7 @@ Source: ETG.2000 clause 6.10 (Eeprom), ETG.2010 (words).
 
 from __future__ import annotations
 
-from drivers.ethercat.eeprom.image import CATEGORIES, Difference, Image
+from drivers.ethercat.eeprom.image import CATEGORIES, UNIT_BYTES, Difference, Image
 from drivers.ethercat.wire.sii import ALIAS_WORD, CONFIG_WORDS
 from profiles.bring_up import BringUp, SyncManagerRule
 from profiles.schema import Profile
@@ -52,8 +52,8 @@ def _of_rules(rules: BringUp) -> list[tuple[str, int, bytes]]:
     bits = sum(_PROTOCOL_BITS[each] for each in rules.protocols)
     if bits:
         wanted.append(("protocols", 0x1C, bits.to_bytes(2, "little")))
-    if rules.eeprom_bytes:
-        wanted.append(("size", 0x3E, (rules.eeprom_bytes // 128 - 1).to_bytes(2, "little")))
+    if rules.eeprom_bytes and 0 <= (units := rules.eeprom_bytes // UNIT_BYTES - 1) <= 0xFFFF:
+        wanted.append(("size", 0x3E, units.to_bytes(2, "little")))
     return wanted
 
 

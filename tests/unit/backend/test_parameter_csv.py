@@ -151,3 +151,30 @@ def test_odd_lines_are_read_or_refused(lines: list[tuple[str, str, str]]) -> Non
         read_csv(text.encode(), MMS7)
     except BadSet:
         return
+
+
+@pytest.mark.parametrize(
+    ("line", "plain"),
+    [
+        ("0x2005, 3, 350, 360, 370", "0x2100, 0, 5, 5, 5"),
+        ("0x2005, 3, 350, 350, 360 # of three axes", "0x2100, 0, 5, 5, 5 # each"),
+        ("2005:03;350;0;1000", "2100:00;5"),
+        ("0x2005,3,16,350", "0x2100,0,5"),
+    ],
+)
+def test_several_numbers_without_a_heading_are_not_guessed(
+    profile: Profile, line: str, plain: str
+) -> None:
+    """A list of six axes gave the commutation offset of its first motor to any drive."""
+    found = read_csv(f"{line}\n{plain}\n".encode(), profile)
+    assert [(r.key, r.raw) for r in found.readings] == [("2100:00", 5)]
+    assert "2005:03: several numbers (" in found.problems[0].words()
+    assert "350" in found.problems[0].words()
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["0x2005, 3, 350, 350, 350 # the same for all", "2005:03,350,Speed bandwidth,Hz,a 3rd name"],
+)
+def test_one_number_and_words_behind_it_are_plain(profile: Profile, line: str) -> None:
+    assert values(profile, f"{line}\n") == {"2005:03": 350}

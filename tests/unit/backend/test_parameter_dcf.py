@@ -160,3 +160,30 @@ def test_from_a_set_to_a_dcf_and_back_on_the_command_line(tmp_path: Path) -> Non
     code, text = run("export", "@a.sdset", "@b.xls")
     assert (code, "neither CSV nor DCF" in text) == (1, True)
     assert run("export", "@none.sdset", "@b.csv")[0] == 1
+
+
+def test_utf_16_without_a_mark_is_a_dcf() -> None:
+    for encoding in ("utf-16-le", "utf-16-be"):
+        data = THEIRS.decode().encode(encoding)
+        _, found = import_list(data, DS_C, "theirs.txt", WHEN)
+        assert {r.key: r.raw for r in found.readings} == {"6083:00": 250, "607C:00": -1200}
+
+
+def test_a_text_is_written_as_it_is_or_not_at_all() -> None:
+    """Two blanks became one, and what was behind 241 characters was lost."""
+    texts = DS_C.by_key["6083:00"].model_copy(update={"type": "STRING", "min_raw": None})
+    family = DS_C.model_copy(update={"parameters": (texts,), "by_key": {texts.key: texts}})
+
+    def written(value: str) -> tuple[dict[str, object], int]:
+        text, left_out = write_dcf(
+            family, [Row("6083:00", value)], file_name="x.dcf", node_name="Z", created=WHEN
+        )
+        with suppress(BadSet):
+            read = read_dcf(text.encode(), family)
+            return {r.key: r.raw for r in read.readings}, left_out
+        return {}, left_out
+
+    for value in ("A  B", "A;B // C", "x" * 300):
+        assert written(value) == ({"6083:00": value}, 0)
+    for value in ("A\nB", " A", "A\t", ""):
+        assert written(value) == ({}, 1)

@@ -79,3 +79,19 @@ def test_objects_of_a_family(family: str) -> None:
             assert subindices == {0}
     # Nobody knows these numbers, so none is written.
     assert device.find("Type[@ProductCode]") is None
+
+
+def test_a_station_without_coe_is_not_said_to_have_it() -> None:
+    """A digital output: a controller would send start-up lists to a mailbox that is not there."""
+    digital = b"""<EtherCATInfo><Vendor><Id>1</Id></Vendor><Descriptions><Devices><Device>
+    <Type ProductCode="#x2" RevisionNo="#x1">O8</Type><Name>O8</Name>
+    <Sm StartAddress="#xF00" ControlByte="#x44" Enable="1">Outputs</Sm>
+    <RxPdo Fixed="1" Sm="0"><Index>#x1600</Index><Name>O</Name><Entry><Index>#x7000</Index>
+    <SubIndex>1</SubIndex><BitLen>8</BitLen><Name>o</Name><DataType>USINT</DataType></Entry></RxPdo>
+    </Device></Devices></Descriptions></EtherCATInfo>"""
+    before = import_file(digital, "a.xml").profile
+    data = export_esi(before)
+    assert ElementTree.fromstring(data).find(".//CoE") is None
+    assert import_file(data, "a.xml").profile.bring_up == before.bring_up
+    # A family without a maker's file is read by CoE.
+    assert ElementTree.fromstring(export_esi(load_profile("mms7"))).find(".//CoE") is not None

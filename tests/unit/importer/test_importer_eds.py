@@ -194,3 +194,27 @@ def test_an_imported_profile_is_written_and_loaded_like_any_other(tmp_path: Path
 def test_files_that_are_mistaken_for_a_description_are_named(data: bytes, what: str) -> None:
     with pytest.raises(ImportFailed, match=rf"^description\.{what} \(file=drive\)$"):
         import_file(data, "drive")
+
+
+@pytest.mark.parametrize("remark", ["# a word", "// a word", "; a word", "#"])
+def test_a_remark_behind_a_number_is_no_part_of_it(remark: str) -> None:
+    odd = (
+        f"[2100]\nParameterName=Odd\nObjectType=0x07 {remark}\nDataType=0x0006 {remark}\n"
+        f"AccessType=rw {remark}\nDefaultValue=16#1F {remark}\nPDOMapping=0 {remark}\n"
+    )
+    imported = import_file(with_object(odd), "odd.eds")
+    found = imported.profile.by_key["2100:00"]
+    assert (found.type, found.access, found.default_raw) == ("UINT16", "rw", 31)
+    assert facts(imported) == []
+
+
+@pytest.mark.parametrize(("count", "last"), [("3", 3), ("254", 254), ("255", 254), ("9" * 30, 254)])
+def test_a_compact_array_has_no_more_than_254_members(count: str, last: int) -> None:
+    odd = (
+        f"[2100]\nParameterName=History\nObjectType=8\nCompactSubObj={count}\n"
+        "DataType=7\nAccessType=ro\n"
+    )
+    keys = import_file(with_object(odd), "odd.eds").profile.by_key
+    assert [k for k in keys if k.startswith("2100")] == [
+        f"2100:{n:02X}" for n in range(1, last + 1)
+    ]

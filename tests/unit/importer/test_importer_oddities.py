@@ -537,3 +537,34 @@ BOMB = (
 def test_hostile_files_get_one_clear_error(data: bytes, words: str) -> None:
     with pytest.raises(ImportFailed, match=words):
         import_file(data, "bad.xml")
+
+
+def test_a_subindex_0_that_is_no_count_is_a_value() -> None:
+    """1004h:00 has the numbers of PDOs in 32 bits; a byte there is the count of members."""
+
+    def record(kind: str, bits: int) -> str:
+        return (
+            "<DataType><Name>DT1004</Name><BitSize>96</BitSize>"
+            f"<SubItem><SubIdx>0</SubIdx><Name>PDOs</Name><Type>{kind}</Type>"
+            f"<BitSize>{bits}</BitSize><BitOffs>0</BitOffs></SubItem>"
+            "<SubItem><SubIdx>1</SubIdx><Name>Synchronous</Name><Type>UDINT</Type>"
+            "<BitSize>32</BitSize><BitOffs>32</BitOffs></SubItem></DataType>"
+        )
+
+    item = scalar(0x1004, "Number of PDOs", "DT1004", 96, access="ro")
+    values = imported(CONTROL + STATUS + item, types=record("UDINT", 32)).by_key
+    assert {key: p.type for key, p in values.items() if key.startswith("1004")} == {
+        "1004:00": "UINT32",
+        "1004:01": "UINT32",
+    }
+    counted = imported(CONTROL + STATUS + item, types=record("USINT", 8)).by_key
+    assert [key for key in counted if key.startswith("1004")] == ["1004:01"]
+
+
+def test_an_identity_of_more_than_32_bits_is_none() -> None:
+    found = import_file(esi(device(CONTROL, code=0x1_0000_0190, revision=0xFFFFFFFF)), "odd.xml")
+    assert found.profile.identity.product_code is None
+    assert found.profile.identity.revision == 0xFFFFFFFF
+    assert [f.params for f in found.report.findings if f.code == "description.does-not-fit"] == [
+        {"name": "ProductCode", "value": 0x1_0000_0190, "type": "UINT32"}
+    ]

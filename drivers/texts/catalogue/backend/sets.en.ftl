@@ -33,6 +33,7 @@ sets_line-other-unit = { $key }: { $word } is in { $theirs }, and this parameter
 sets_line-no-whole-number = { $key }: { $word } is not a whole number
 sets_line-no-parameter = { $title } has no parameter { QUOTED($word) }
 sets_line-two-ways = { $key }: { $word } can be read in two ways
+sets_line-several-numbers = { $key }: several numbers ({ $words }), and no heading that names the column of the value
 sets_line-no-number = { $key }: { QUOTED($word) } is not a number
 sets_line-wrong-type = { $key }: { QUOTED($word) } is not a value of this type
 sets_other-product = { $name } is for product { NUM($product, format: "08X") }h, this family is { NUM($ours, format: "08X") }h: check every value

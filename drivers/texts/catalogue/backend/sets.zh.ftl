@@ -33,6 +33,7 @@ sets_line-other-unit = { $key }：{ $word } 的单位为 { $theirs }，而该参
 sets_line-no-whole-number = { $key }：{ $word } 不是整数
 sets_line-no-parameter = { $title } 没有参数 { QUOTED($word) }
 sets_line-two-ways = { $key }：{ $word } 有两种读法
+sets_line-several-numbers = { $key }：有多个数（{ $words }），且没有标题行指明数值所在的列
 sets_line-no-number = { $key }：{ QUOTED($word) } 不是数
 sets_line-wrong-type = { $key }：{ QUOTED($word) } 不是该类型的值
 sets_other-product = { $name } 用于产品 { NUM($product, format: "08X") }h，而本系列为 { NUM($ours, format: "08X") }h：请检查每个值
