@@ -6,6 +6,9 @@ import os
 import sys
 from collections.abc import Sequence
 
+FOLDERS_MOVE_WHILE_OPEN = sys.platform != "win32"
+"""Whether a folder can be renamed while a process has a file in it open."""
+
 
 def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
     """Write the parts in order, by one system call if there is one; return the bytes written.
