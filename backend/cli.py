@@ -169,6 +169,10 @@ COMMANDS = {
         "preflight:preflight_command",
         "Look at this computer, measure how punctual it is, and name the change that helps most.",
     ),
+    "latency": (
+        "latency:latency_command",
+        "For how long a serial adapter holds answers back; lower it with --set.",
+    ),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 
