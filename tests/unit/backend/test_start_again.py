@@ -20,6 +20,11 @@ from drivers.errors import Busy
 def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     pages: list[str] = []
     monkeypatch.setattr(serving_module.webbrowser, "open", pages.append)
+
+    async def nothing() -> None:
+        """Libraries that the server loads after its start are not needed here."""
+
+    monkeypatch.setattr(serving_module, "settle", nothing)
     return pages
 
 

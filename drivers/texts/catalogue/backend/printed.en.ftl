@@ -159,6 +159,7 @@ printed_should-be = {""}, should be { $expected }
 printed_starting-virtual = starting the virtual drives …
 printed_station = station { $station }
 printed_stored-version = { $name } version { $version }
+printed_task-written = { $file } is written. On the computer with Windows: schtasks /Create /TN servodeck /XML "{ $file }"; schtasks /Delete /TN servodeck removes it
 printed_then = then
 printed_trial-does-not = {"  "}tried { $setting } { $before } -> { $after }: { $refusal }; undone
 printed_trial-reaches = {"  "}tried { $setting } { $before } -> { $after }: reaches Operational; undone. To keep it, set { $setting } in the profile

@@ -156,6 +156,7 @@ printed_should-be = {""}，应为 { $expected }
 printed_starting-virtual = 正在启动虚拟驱动器……
 printed_station = 站 { $station }
 printed_stored-version = { $name } 版本 { $version }
+printed_task-written = 已写入 { $file }。在 Windows 计算机上执行：schtasks /Create /TN servodeck /XML "{ $file }"；删除用 schtasks /Delete /TN servodeck
 printed_then = 之后
 printed_trial-does-not = {"  "}尝试 { $setting } { $before } -> { $after }：{ $refusal }；已撤销
 printed_trial-reaches = {"  "}尝试 { $setting } { $before } -> { $after }：可进入 Operational 状态；已撤销。如需保留，请在配置文件中设置 { $setting }
