@@ -162,7 +162,7 @@ class Adapters:
 
 def _changed(kept: Mapping[str, object]) -> Changed:
     """One entry of the list; ValueError or TypeError where it is not what servodeck writes."""
-    one = Changed(**kept)  # type: ignore[arg-type] - checked in the next lines
+    one = Changed(**kept)  # type: ignore[arg-type]  # checked below
     LatencyTimer(one.device, one.before_ms, one.place)
     if not LATENCY_MS[0] <= one.before_ms <= LATENCY_MS[1]:
         raise ValueError(f"{one.before_ms} ms")
