@@ -172,6 +172,10 @@ COMMANDS = {
         "server.preflight:preflight_command",
         "Look at this computer, measure how punctual it is, and name the change that helps most.",
     ),
+    "latency": (
+        "server.latency:latency_command",
+        "For how long a serial adapter holds answers back; lower it with --set.",
+    ),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""
 

@@ -86,6 +86,14 @@ def serial_device(place: str) -> str:
     return device
 
 
+def is_same_port(one: str, other: str) -> bool:
+    """Return whether two names stand for one serial port: links, and the forms of a COM port."""
+    com = [_COM.fullmatch(name) for name in (one, other)]
+    if all(com):
+        return one.upper().rpartition("\\")[2] == other.upper().rpartition("\\")[2]
+    return not any(com) and os.path.realpath(one) == os.path.realpath(other)
+
+
 def ports_found() -> str:
     """Return the names of the serial ports of this computer for display, or "none"."""
     return ", ".join(sorted(port.device for port in list_ports.comports())) or "none"

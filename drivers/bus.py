@@ -53,6 +53,7 @@ class BusKind:
     """One kind of bus. ``link`` creates the link of a URL without opening it.
 
     ``require_place`` raises OutOfRange if the form of the adapter name is not allowed.
+    ``serial_port`` returns the serial port that an adapter name stands for; empty for none.
     """
 
     example: str
@@ -60,6 +61,7 @@ class BusKind:
     require_place: Callable[[str], None]
     link: Callable[[BusUrl], Link]
     serial: SerialLine | None = None
+    serial_port: Callable[[str], str] = lambda _place: ""
 
     @property
     def like(self) -> Text:

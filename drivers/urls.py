@@ -63,6 +63,15 @@ def parse_url(url: str) -> BusUrl:
     return bus
 
 
+def serial_port_of(url: str) -> str:
+    """Return the serial port that a bus URL names; empty for none, and for what is no bus URL."""
+    try:
+        bus = parse_url(url)
+    except OutOfRange:
+        return ""
+    return "" if bus.is_virtual else bus_kind(bus.scheme).serial_port(bus.place)
+
+
 def link_for(url: str | BusUrl) -> Link:
     """Create the link of a bus URL without opening it.
 

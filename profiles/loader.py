@@ -24,6 +24,7 @@ from pydantic import ValidationError
 
 from profiles.language.standard_help import HELP_FILE, with_standard_help
 from profiles.motion.classify import STANDARD_FILE, classified
+from profiles.replacing import move_into_place
 from profiles.schema import Profile
 
 #: The profile for an otherwise unknown CiA 402 drive.
@@ -258,6 +259,6 @@ def _write_cache(path: Path, profile: Profile) -> None:
             old.unlink(missing_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as handle:
             handle.write(pickle.dumps(profile))
-        Path(handle.name).replace(path)
+        move_into_place(Path(handle.name), path)
     except OSError:
         return

@@ -40,6 +40,16 @@ ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}=
 _AFTER_INSTALL = """\
 #!/bin/sh
 set -e
+# What was to replace or remove it failed: the service that stopped for that goes on.
+if [ -z "$DPKG_ROOT" ] && [ -d /run/systemd/system ]; then
+    case "$1" in
+        abort-remove) systemctl enable --now servodeck.service ;;
+        abort-upgrade|abort-deconfigure)
+            if systemctl is-enabled --quiet servodeck.service; then
+                systemctl start servodeck.service
+            fi ;;
+    esac
+fi
 if [ "$1" = configure ]; then
     state="$DPKG_ROOT/var/lib/servodeck"
     mkdir -p "$state"
@@ -52,6 +62,8 @@ if [ "$1" = configure ]; then
         if [ -d /run/systemd/system ]; then
             systemctl daemon-reload
             udevadm control --reload || true
+            # For adapters that are plugged in already; their terminals are left alone.
+            udevadm trigger --action=add --subsystem-match=usb-serial || true
             systemctl enable servodeck.service
             systemctl restart servodeck.service
         fi
@@ -61,23 +73,37 @@ fi
 _BEFORE_REMOVAL = """\
 #!/bin/sh
 set -e
-if [ -z "$DPKG_ROOT" ] && [ "$1" = remove ] && [ -d /run/systemd/system ]; then
-    # What moves is braked first (SIGTERM).
-    systemctl disable --now servodeck.service
+if [ -z "$DPKG_ROOT" ] && [ -d /run/systemd/system ]; then
+    # What moves is braked first (SIGTERM). On an upgrade as well: a running program would load
+    # modules of the new version beside those of its own.
+    case "$1" in
+        remove) systemctl disable --now servodeck.service ;;
+        upgrade) systemctl stop servodeck.service ;;
+    esac
 fi
 # What Python compiled while the program ran is not in dpkg's list.
-find "$DPKG_ROOT/opt/servodeck" -name __pycache__ -prune -exec rm -rf {} +
+if [ -d "$DPKG_ROOT/opt/servodeck" ]; then
+    find "$DPKG_ROOT/opt/servodeck" -name __pycache__ -prune -exec rm -rf {} +
+fi
 """
 _AFTER_REMOVAL = """\
 #!/bin/sh
 set -e
 if [ "$1" = purge ]; then
     rm -rf "$DPKG_ROOT/var/lib/servodeck"
+    # adduser, which has deluser, need not be there any more.
     if [ -z "$DPKG_ROOT" ] && getent passwd servodeck >/dev/null; then
-        deluser --quiet --system servodeck
+        if command -v deluser >/dev/null; then
+            deluser --quiet --system servodeck
+        else
+            echo "servodeck: the user servodeck stays, as deluser is not installed"
+        fi
     fi
 elif [ "$1" = remove ]; then
     echo "servodeck: /var/lib/servodeck (drives, measurements, accounts) stays; purging deletes it"
+    if [ -z "$DPKG_ROOT" ] && [ -d /run/systemd/system ]; then
+        systemctl daemon-reload
+    fi
 fi
 """
 #: An older program does not understand the state of a newer one.

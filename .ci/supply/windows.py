@@ -47,7 +47,8 @@ servodeck {version}, for Windows 10 or newer (64-bit)\r
 open-page.cmd            double click: start the server and open its page in a browser\r
 servodeck.cmd --help     all commands, in a terminal\r
 \r
-EtherCAT is not available on Windows: the page says what to do instead. Drives on COM ports are.\r
+Drives on COM ports need nothing else. EtherCAT needs Npcap (npcap.com), which is installed by\r
+itself; the page says what is missing.\r
 \r
 Nothing is installed. What is kept lies in the state folder (servodeck.cmd serve --help), not\r
 here: delete this folder to remove the program, and unpack a newer one beside it to upgrade.\r

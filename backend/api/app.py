@@ -42,6 +42,7 @@ from backend.api.security.socket import OpenSockets
 from backend.api.sets import lists as routes_lists
 from backend.api.sets import routes as routes_sets
 from backend.api.spoken import Spoken
+from backend.api.station import adapters as routes_adapters
 from backend.api.station import description as routes_description
 from backend.api.station import doctor as routes_doctor
 from backend.api.station import eeprom as routes_eeprom
@@ -88,6 +89,7 @@ _PARTS = (
     routes_ethercat,
     routes_doctor,
     routes_flight,
+    routes_adapters,
     routes_preflight,
     routes_box,
     routes_lists,

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import SUFFIX, ParameterSet
-from backend.store.files import checked_name, write_atomically
+from backend.store.files import checked_name, new_name, write_atomically
 from drivers.errors import NotAllowed
 
 
@@ -70,7 +70,7 @@ class SetLibrary:
             NotAllowed: the name exists and ``overwrite`` is False. StorageFailed: disk.
         """
         del tags
-        path = self._path(name)
+        path = self.folder / new_name(name, SUFFIX)
         parameter_set.parse(data, path.name)
         if path.exists() and not overwrite:
             raise NotAllowed("library.exists-already", value=path.name)

@@ -10,7 +10,7 @@ from backend.library.catalogue import Library
 from backend.library.entries import Addition, AxisIdentity, Entry
 from backend.parameters import set_file as parameter_set
 from backend.parameters.set_file import SUFFIX, BadSet, ParameterSet
-from backend.store.files import StorageFailed, checked_name, files_of, shown_name
+from backend.store.files import StorageFailed, checked_name, files_of, new_name, shown_name
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 
@@ -97,7 +97,7 @@ class LibrarySets:
             BadSet: the contents are no parameter set. NotAllowed: the name exists and
             ``overwrite`` is False. StorageFailed: disk or database. Nothing is stored then.
         """
-        name = checked_name(name, SUFFIX)
+        name = new_name(name, SUFFIX)
         content = parameter_set.parse(data, name)
         if not overwrite and self.library.named("set", name) is not None:
             raise NotAllowed("library.exists-already-choose-another-2", value=name)

@@ -18,6 +18,7 @@ from drivers.computer.host_facts import HostFacts
 from drivers.computer.host_settings import HostSettings, Setting, affinity, command
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
+from profiles.replacing import move_into_place
 
 RESTORE_LIST = "preflight-restore.json"
 _QUICK_IDLE_US = 20
@@ -143,7 +144,7 @@ class Fixes:
             json.dump(listed, file, indent=1)
             file.flush()
             os.fsync(file.fileno())
-        fresh.replace(self.folder / RESTORE_LIST)
+        move_into_place(fresh, self.folder / RESTORE_LIST)
 
 
 def _change(kept: dict[str, str]) -> Change:

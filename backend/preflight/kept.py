@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from drivers.computer.lateness import Measured, from_json
+from profiles.replacing import move_into_place
 
 FILE = "preflight.json"
 
@@ -53,4 +54,4 @@ def keep(folder: Path, interface: str, measured: Mapping[int, Measured]) -> None
     folder.mkdir(parents=True, exist_ok=True)
     fresh = folder / f".{FILE}.new"
     fresh.write_text(json.dumps(listed), "utf-8")
-    fresh.replace(folder / FILE)
+    move_into_place(fresh, folder / FILE)

@@ -23,6 +23,7 @@ from backend.recording.reader import RecordingReader
 from backend.store.files import StorageFailed
 from backend.store.spreadsheet import as_text
 from drivers.computer.processes import yield_processor
+from profiles.replacing import move_into_place
 
 
 async def build_apart(evidence: Evidence, target: Path) -> None:
@@ -72,9 +73,10 @@ def _build(evidence: Evidence, target: Path) -> None:
         part = Path(folder) / "bundle.zip"
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
             _fill(archive, evidence, Path(folder))
-        with part.open("rb") as file:
+        # Open for writing, which flushing on Windows asks for (FlushFileBuffers).
+        with part.open("r+b") as file:
             os.fsync(file.fileno())
-        part.replace(target)
+        move_into_place(part, target)
 
 
 def _failed(target: Path, why: str) -> StorageFailed:

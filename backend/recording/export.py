@@ -24,6 +24,7 @@ from backend.recording.reader import Channel, RecordingReader
 from backend.recording.table import merged
 from backend.store.spreadsheet import as_text
 from drivers.computer.processes import yield_processor
+from profiles.replacing import move_into_place
 
 #: Nice value of the process, which runs for seconds; the buses and the pages have priority.
 NICE = 10
@@ -43,7 +44,7 @@ def export(source: Path, target: Path, kind: str, progress: Progress) -> None:
     try:
         with RecordingReader(source) as reader:
             write(reader, part, progress)
-        part.replace(target)
+        move_into_place(part, target)
     finally:
         part.unlink(missing_ok=True)
 

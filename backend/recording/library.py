@@ -12,7 +12,13 @@ from typing import Any
 
 from backend.recording.chunks import SUFFIX
 from backend.recording.reader import BadRecording, RecordingReader, Summary
-from backend.store.files import checked_name, files_of, shown_name, write_atomically
+from backend.store.files import (
+    checked_name,
+    files_of,
+    new_name,
+    shown_name,
+    write_atomically,
+)
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text
 
@@ -93,7 +99,7 @@ class RecordingLibrary:
 
     def free_name(self, wanted: str) -> str:
         """File name from ``wanted``, with a number appended where it exists already."""
-        stem = checked_name(wanted, SUFFIX).removesuffix(SUFFIX)
+        stem = new_name(wanted, SUFFIX).removesuffix(SUFFIX)
         name, number = stem, 2
         while (self.folder / (name + SUFFIX)).exists():
             name, number = f"{stem} {number}", number + 1

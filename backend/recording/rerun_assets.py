@@ -22,6 +22,7 @@ import platformdirs
 
 from drivers.computer.files import program_name
 from drivers.errors import NotAllowed
+from profiles.replacing import move_into_place
 
 FILES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}
 #: Time limit for the start of the command line [s]; it takes about a second, more when busy.
@@ -87,7 +88,7 @@ def extract(folder: Path) -> None:
     for name, content in contents.items():
         part = folder / f".{name}.{os.getpid()}.part"
         part.write_bytes(gzip.compress(content, 6))
-        part.replace(folder / f"{name}.gz")
+        move_into_place(part, folder / f"{name}.gz")
 
 
 def free_port() -> int:

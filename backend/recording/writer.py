@@ -22,6 +22,7 @@ from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
 from drivers.texts import limits
 from drivers.texts.answers import sentence
+from profiles.replacing import move_into_place
 
 #: Size of the blocks that may wait for the disk: two minutes at 16 channels × 4 kHz.
 MAX_QUEUED_BYTES = 64 * 1024 * 1024
@@ -292,7 +293,7 @@ def _name_once(part: Path, path: Path) -> None:
     except OSError:
         if path.exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
-        part.replace(path)
+        move_into_place(part, path)
     else:
         part.unlink()
 

@@ -278,9 +278,10 @@ def _flush(file: Path) -> None:
     """Flush the file and its folder to the disk, waiting up to `FLUSH_S`; a slow disk continues."""
 
     def flushed() -> None:
-        for path in (file, file.parent):
+        # Windows flushes only what is open for writing (FlushFileBuffers).
+        for path, mode in ((file, os.O_RDWR), (file.parent, os.O_RDONLY)):
             try:
-                handle = os.open(path, os.O_RDONLY)
+                handle = os.open(path, mode)
             except OSError:
                 # A system where folders cannot be opened, or a list that was removed meanwhile.
                 continue

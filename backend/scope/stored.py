@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from backend.store.files import StorageFailed, checked_name, write_atomically
+from backend.store.files import StorageFailed, checked_name, new_name, write_atomically
 from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
 from drivers.texts import limits
@@ -107,7 +107,7 @@ class ScopeStore:
             NotAllowed: not a file name, or too many set-ups.
             StorageFailed: the disk is nearly full or cannot be written.
         """
-        path = self.folder / "setups" / checked_name(name, SETUP_SUFFIX)
+        path = self.folder / "setups" / new_name(name, SETUP_SUFFIX)
         _check_room(path, SETUP_SUFFIX, MOST_SETUPS)
         write_atomically(path, json.dumps(content, ensure_ascii=False, indent=1).encode())
 
@@ -147,7 +147,7 @@ class ScopeStore:
         """
         snapshot_header(data, name)
         folder = self.folder / "snapshots"
-        stem = checked_name(name, SNAPSHOT_SUFFIX).removesuffix(SNAPSHOT_SUFFIX)
+        stem = new_name(name, SNAPSHOT_SUFFIX).removesuffix(SNAPSHOT_SUFFIX)
         path, number = folder / (stem + SNAPSHOT_SUFFIX), 2
         while path.exists():
             path, number = folder / f"{stem} {number}{SNAPSHOT_SUFFIX}", number + 1

@@ -31,6 +31,8 @@ class Buses:
         #: Causes a fault in a virtual drive, by bus URL and station; None without a demo bench.
         self.cause_fault: Callable[[str, int], None] | None = None
         self.opened: dict[str, Link] = {}
+        #: Mean round trip of buses that were closed [ms], by URL; None where none was measured.
+        self.last_round_trip_ms: dict[str, float | None] = {}
         self._bench = bench
         self._opening = asyncio.Lock()
 
@@ -72,6 +74,7 @@ class Buses:
         link = self.opened.pop(url, None)
         if link is None:
             raise NotAllowed("station.not-open", value=url)
+        self.last_round_trip_ms[url] = link.quality(None).round_trip_ms
         await link.close()
         self._bench.drives_changed()
 

@@ -10,7 +10,9 @@ from pathlib import Path
 
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
+from profiles.replacing import move_into_place
 
+_DEVICE = re.compile(r"CON|PRN|AUX|NUL|(?:COM|LPT)[0-9¹²³]", re.IGNORECASE)
 _NAME = re.compile(r"^\w[\w .\-]{0,100}$")
 
 
@@ -30,6 +32,22 @@ def checked_name(name: str, suffix: str) -> str:
     if not _NAME.fullmatch(stem) or ".." in stem:
         raise NotAllowed("store.not-file-name", value=name, limit=text("limit.file-name"))
     return stem + suffix
+
+
+def new_name(name: str, suffix: str) -> str:
+    """Plain file name for a new file that every system can have.
+
+    Windows takes some names for devices, with any suffix (learn.microsoft.com, "Naming Files,
+    Paths, and Namespaces"). They are refused on each system, as files are carried from one to
+    another; existing files of these names can still be read where the system has them.
+
+    Raises:
+        NotAllowed: as `checked_name`, or the name of a device.
+    """
+    checked = checked_name(name, suffix)
+    if _DEVICE.fullmatch(checked.partition(".")[0].rstrip()):
+        raise NotAllowed("store.device-name", value=name)
+    return checked
 
 
 def files_of(folder: Path, *suffixes: str) -> list[Path]:
@@ -54,7 +72,8 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
     the call then does not wait for the disk.
 
     Raises:
-        StorageFailed: for example disk full or no permission; the old file stays.
+        StorageFailed: for example disk full, no permission, or open in a program for longer than a
+            moment; the old file stays.
     """
     try:
         if path.is_dir():
@@ -72,7 +91,20 @@ def write_atomically(path: Path, data: bytes, *, durable: bool = True) -> None:
             handle.flush()
             if durable:
                 os.fsync(handle.fileno())
-        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise _failed(path, error) from error
+    try:
+        move_into_place(temporary, path)
+    except PermissionError as error:
+        # The folder can be written, as the temporary file was.
+        temporary.unlink(missing_ok=True)
+        raise StorageFailed(
+            "store.held-open",
+            value=str(path),
+            path=str(path.name or path),
+            strerror=str(error.strerror or error),
+        ) from error
     except OSError as error:
         temporary.unlink(missing_ok=True)
         raise _failed(path, error) from error

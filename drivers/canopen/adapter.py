@@ -6,10 +6,12 @@ import errno
 from pathlib import Path
 
 import can
+import serial
 
 from drivers.adapters import require_channel, serial_device
 from drivers.canopen.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
+from drivers.computer.terminals import deliver_soon, port_errno
 from drivers.errors import DriveError, LinkLost
 from drivers.texts.message import Text, text
 
@@ -38,12 +40,14 @@ def _open(url: CanUrl) -> can.BusABC:
     require_channel(url.interface, url.channel)
     if url.interface == "slcan":
         # python-can would open any URL that pyserial knows; a resolved device path is not a URL.
-        return SlcanBus(
+        bus = SlcanBus(
             serial_device(url.channel),
             tty_baudrate=url.tty_baudrate or 115200,
             bitrate=url.bitrate,
             sleep_after_open=url.settle_s,
         )
+        deliver_soon(bus.serialPortOrig)
+        return bus
     if url.interface == "udp_multicast":
         if url.port is not None:
             return can.Bus(interface="udp_multicast", channel=url.channel, fd=False, port=url.port)
@@ -87,6 +91,8 @@ def _errno(error: BaseException | None) -> int | None:
         for value in (getattr(error, "errno", None), getattr(error, "error_code", None)):
             if isinstance(value, int):
                 return value
+        if isinstance(error, serial.SerialException) and (number := port_errno(error)):
+            return number
         error = error.__cause__ or error.__context__
     return None
 

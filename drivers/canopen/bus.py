@@ -17,6 +17,11 @@ def _require_place(place: str) -> None:
         require_channel(interface, unquote(channel))
 
 
+def _serial_port(place: str) -> str:
+    interface, _, channel = place.partition("/")
+    return unquote(channel) if interface == "slcan" else ""
+
+
 def _link(url: BusUrl) -> Link:
     from drivers.canopen.link import CanopenLink
 
@@ -32,4 +37,5 @@ BUS = BusKind(
     ),
     require_place=_require_place,
     link=_link,
+    serial_port=_serial_port,
 )

@@ -6,6 +6,26 @@ import os
 import sys
 from collections.abc import Sequence
 
+from drivers.computer.packet_capture import Registry, windows_registry
+
+FOLDERS_MOVE_WHILE_OPEN = sys.platform != "win32"
+"""Whether a folder can be renamed while a process has a file in it open."""
+
+
+_FILE_SYSTEM = r"SYSTEM\CurrentControlSet\Control\FileSystem"
+#: MAX_PATH without its closing NUL (learn.microsoft.com, "Maximum Path Length Limitation").
+_MAX_PATH = 259
+
+
+def longest_path(registry: Registry = windows_registry) -> int | None:
+    """Return the characters that a path may have; None where no limit is in the way.
+
+    CPython allows longer paths on Windows where the computer has the setting LongPathsEnabled.
+    """
+    if sys.platform != "win32" or registry(_FILE_SYSTEM, "LongPathsEnabled") == 1:
+        return None
+    return _MAX_PATH
+
 
 def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:
     """Write the parts in order, by one system call if there is one; return the bytes written.

@@ -28,7 +28,7 @@ __all__ = [
     "AF_NETLINK", "AF_PACKET", "AF_UNIX", "MSG_DONTWAIT", "NETLINK_ROUTE", "RAW_FRAMES",
     "hold_name", "interface_flags", "open_sockets", "receive_with_notes",
     "require_linux", "set_blocking", "set_interface_flags",
-    "shared_memory_file",
+    "shared_memory_file", "take_port_alone",
 ]  # fmt: skip
 
 
@@ -73,6 +73,19 @@ def receive_with_notes(
         raise OSError("recvmsg is not available on Windows")
     else:  # noqa: RET506 - type checkers follow the branches of a system
         return source.recvmsg(most, notes)
+
+
+def take_port_alone(listening: socket.socket) -> None:
+    """Let a socket have a port right after its last user ended, but never beside another program.
+
+    SO_REUSEADDR allows the first on POSIX. On Windows it allows the second: two programs then
+    listen on one port, and either gets the connections (learn.microsoft.com, "Using SO_REUSEADDR
+    and SO_EXCLUSIVEADDRUSE").
+    """
+    if sys.platform == "win32":
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_EXCLUSIVEADDRUSE, 1)
+    else:
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
 
 def interface_flags(interface: str) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -67,6 +68,47 @@ def deliver_soon(port: serial.Serial) -> bool:
     except (OSError, ValueError):
         return False
     return True
+
+
+#: How pyserial's message on Windows ends: the WinError with its errno, text, file and own number.
+_WIN_ERROR = re.compile(r"\w*Error\(\d+, .*, None, (\d+)\)", re.DOTALL)
+#: ERROR_FILE_NOT_FOUND, ERROR_ACCESS_DENIED (a COM port has one user at a time),
+#: ERROR_INVALID_PARAMETER (of SetCommState).
+_WIN_ERRNO = {2: errno.ENOENT, 5: errno.EBUSY, 87: errno.EINVAL}
+
+
+def port_errno(error: BaseException) -> int:
+    """Return the errno of an error on opening a serial port; 0 if it is not known.
+
+    On Windows pyserial keeps only the text of the system's error. There a port that another program
+    has open is EBUSY; the system itself calls it "access denied".
+    """
+    text = str(error)
+    windows = _WIN_ERROR.search(text)
+    if windows is not None:
+        return _WIN_ERRNO.get(int(windows[1]), 0)
+    stated = getattr(error, "errno", None)
+    if isinstance(stated, int):
+        return stated
+    posix = re.search(r"\[Errno (\d+)\]", text)
+    return int(posix[1]) if posix else 0
+
+
+def may_open(device: str) -> bool:
+    """Return whether this user may open a serial port; on Windows every user may.
+
+    A COM port is no file there: its permissions cannot be asked for.
+    """
+    return sys.platform == "win32" or os.access(device, os.R_OK | os.W_OK)
+
+
+def is_in_use(device: str) -> bool:
+    """Return whether a program has this serial port open; the port is opened for an instant."""
+    try:
+        serial.Serial(device, timeout=0, **port_options()).close()
+    except (OSError, ValueError, *TERMINAL_ERRORS) as error:
+        return port_errno(error) in (errno.EBUSY, errno.EAGAIN)
+    return False
 
 
 def own_terminals() -> set[str]:

@@ -20,6 +20,7 @@ BUS = BusKind(
     traits=LinkTraits(silent=SERIAL_SILENT),
     require_place=require_serial_form,
     link=_link,
+    serial_port=lambda place: place,
     serial=SerialLine(
         (
             2_500_000, 115_200, 1_000_000, 5_000_000, 921_600, 460_800, 230_400, 57_600, 38_400,

@@ -22,6 +22,7 @@ BUS = BusKind(
     traits=LinkTraits(registers=True, silent=SERIAL_SILENT),
     require_place=require_serial_form,
     link=_link,
+    serial_port=lambda place: place,
     serial=SerialLine(
         (115_200, 9600, 19_200, 57_600, 38_400, 230_400, 460_800, 921_600),
         ("N", "E", "O"),

@@ -21,6 +21,7 @@ from drivers.computer.terminals import (
     Readiness,
     deliver_soon,
     has_descriptor,
+    port_errno,
     port_options,
 )
 from drivers.errors import DriveError, LinkLost, OutOfRange
@@ -126,7 +127,7 @@ def _unsuitable(settings: LineSettings, text: str) -> OutOfRange:
 
 def _explain(settings: LineSettings, error: OSError) -> DriveError:
     device, text = settings.device, str(error)
-    number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)
+    number = port_errno(error)
     if number == errno.ENOENT:
         return LinkLost("modbus.no-serial-port", device=device, ports_found=ports_found())
     if number == errno.EACCES:
@@ -136,9 +137,6 @@ def _explain(settings: LineSettings, error: OSError) -> DriveError:
     if number == errno.EINVAL or "baud" in text:
         return _unsuitable(settings, text)
     return LinkLost("modbus.cannot-opened", device=device, text=text)
-
-
-_ERRNOS = (errno.ENOENT, errno.EACCES, errno.EAGAIN, errno.EBUSY, errno.EINVAL)
 
 
 def _gone(device: str, error: Exception | None) -> LinkLost:

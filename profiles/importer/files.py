@@ -16,6 +16,7 @@ from profiles.importer.eds import read_eds
 from profiles.importer.esi import EsiDevice, EsiFile, esi_devices, open_esi, read_device
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import CLASS_FIELDS
+from profiles.replacing import move_into_place
 from profiles.schema import Profile
 
 #: libyaml's writer if PyYAML was built with it; ten times as fast.
@@ -161,7 +162,7 @@ def write_profile(imported: Profile, folder: Path) -> Path:
     part = target.with_suffix(".part")
     try:
         part.write_text(text, "utf-8")
-        part.replace(target)
+        move_into_place(part, target)
     except OSError:
         part.unlink(missing_ok=True)
         raise

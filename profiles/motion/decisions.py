@@ -16,6 +16,7 @@ from pydantic import TypeAdapter
 from profiles.loader import is_own, load_profile, user_folder
 from profiles.motion.classify import standard_rule
 from profiles.motion.rule import Motion, MotionRule
+from profiles.replacing import move_into_place
 from profiles.schema import Parameter, Profile
 
 FILE_NAME = "motion.yaml"
@@ -118,7 +119,7 @@ def _write(drive: str, rules: tuple[MotionRule, ...]) -> None:
     part = path.with_suffix(".part")
     try:
         part.write_text(text, "utf-8")
-        part.replace(path)
+        move_into_place(part, path)
     except OSError:
         part.unlink(missing_ok=True)
         raise

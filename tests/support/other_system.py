@@ -48,6 +48,8 @@ WINDLL = types.SimpleNamespace(
 DIFFERENT: dict[str, dict[str, object]] = {
     "sys": {"platform": "win32"},
     "ctypes": {"windll": WINDLL},
+    # An option that this system has; that the port is not shared is not shown here.
+    "socket": {"SO_EXCLUSIVEADDRUSE": socket.SO_KEEPALIVE},
 }
 
 

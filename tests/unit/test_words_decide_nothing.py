@@ -53,8 +53,12 @@ ALLOWED: dict[tuple[str, str], str] = {
         "if error.args[0] == errno.EINTR:",
     ): "termios.error carries its number as its first argument only",
     (
-        "drivers/modbus/port.py",
-        'number = error.errno or next((n for n in _ERRNOS if f"Errno {n}]" in text), 0)',
+        "drivers/computer/terminals.py",
+        "windows = _WIN_ERROR.search(text)",
+    ): _PYSERIAL,
+    (
+        "drivers/computer/terminals.py",
+        'posix = re.search(r"\\[Errno (\\d+)\\]", text)',
     ): _PYSERIAL,
     (
         "drivers/modbus/port.py",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 
 from serial.tools import list_ports
@@ -10,6 +9,7 @@ from serial.tools import list_ports
 from backend.api.errors import message_or_none, words_of
 from backend.api.station.models import Interfaces, NetworkInterface, SerialPort
 from drivers.computer.interfaces import Interface, network_interfaces
+from drivers.computer.terminals import may_open
 from drivers.texts.message import text
 
 
@@ -30,7 +30,7 @@ def list_interfaces(virtual: Sequence[str]) -> Interfaces:
 
 
 def _serial(path: str, description: str) -> SerialPort:
-    usable = os.access(path, os.R_OK | os.W_OK)
+    usable = may_open(path)
     problem = None if usable else text("api-station.no-permission-for-port")
     return SerialPort(
         path=path,

@@ -9,6 +9,7 @@ from pydantic import Field
 from backend.api.models import Message
 from backend.preflight.findings import Code, Fix
 from backend.preflight.verdicts import Grade, Purpose
+from drivers.computer.latency_timer import LATENCY_MS, InForce
 
 
 class PreflightRequest(Message):
@@ -93,3 +94,31 @@ class PreflightUndone(Message):
 
     restored: list[str]
     left: list[str]
+
+
+class LatencyRequest(Message):
+    """The latency timer that a serial adapter is to have."""
+
+    device: str = Field(max_length=250, description="serial port, as COM3 or /dev/ttyUSB0")
+    ms: int = Field(default=1, ge=LATENCY_MS[0], le=LATENCY_MS[1])
+
+
+class LatencyTimerInfo(Message):
+    """The latency timer of a serial adapter.
+
+    ``..._at_most`` are bounds from the timer alone; ``reads_measured`` and ``reads_before`` are
+    measured on the bus. All in reads per second, one after another.
+    """
+
+    device: str
+    ms: int | None = Field(description="None: the adapter has none that is known")
+    restarts: bool = Field(description="a change restarts the adapter; no program may use it then")
+    reads_at_most: float | None
+    lowered_ms: int
+    lowered_reads_at_most: float
+    reads_measured: float | None = Field(description="of the bus that is open at this port")
+    before_ms: int | None = Field(description="timer before servodeck changed it, to be restored")
+    reads_before: float | None = Field(description="measured before the change")
+    in_force: InForce | None = Field(
+        description="of a change just made; None: none was made, or somebody changed it since"
+    )

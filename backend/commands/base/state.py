@@ -8,8 +8,13 @@ from pathlib import Path
 import platformdirs
 
 from backend.store import state_version
+from drivers.computer.files import longest_path
+from drivers.errors import NotAllowed
 
 STATE_FOLDER_VARIABLE = "SERVODECK_CONFIG"
+#: Characters of the longest path within a state folder: a recording with a name of 100 letters, in
+#: its folder, while it is written under a temporary name.
+_WITHIN = 140
 
 
 def state_folder(chosen: Path | None) -> Path:
@@ -20,8 +25,14 @@ def state_folder(chosen: Path | None) -> Path:
 
     Raises:
         StateRefused: a newer servodeck has written it.
+        NotAllowed: its path is too long for the files in it (Windows).
     """
     folder = chosen_folder(chosen)
+    longest = longest_path()
+    if longest is not None and len(str(folder.absolute())) > longest - _WITHIN:
+        raise NotAllowed(
+            "command.state-folder-too-deep", value=str(folder), limit=str(longest - _WITHIN)
+        )
     state_version.check(folder)
     return folder
 

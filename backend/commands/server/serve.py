@@ -12,11 +12,14 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import httpx
 import uvicorn
+from pydantic import ValidationError
 
 from backend.api.admission.accepting import AcceptingSocket
 from backend.api.app import make_app
 from backend.api.security.protocol import AcceptingConfig, PatientProtocol, PatientSocket
+from backend.api.station.models import Health
 from backend.commands.base.printing import print_text
 from backend.people.login.marker import AccountsMarker
 from backend.people.station import People
@@ -31,7 +34,8 @@ from backend.work import libraries
 from backend.work.journal import Entry
 from drivers.computer import scheduling
 from drivers.computer.processes import raise_descriptors
-from drivers.errors import NotAllowed
+from drivers.computer.sockets import take_port_alone
+from drivers.errors import Busy, NotAllowed
 from profiles import load_all
 from profiles.loader import ProfileError
 
@@ -47,6 +51,8 @@ PING_S, PONG_S = 5.0, 10.0
 BACKLOG = 2048
 #: Open files and connections; the default limit of a process is often a thousand.
 DESCRIPTORS = 8192
+#: Time for the answer of a server that runs already [s].
+_LOOK_S = 3.0
 
 
 #: Modules that are imported only after the start, so that the page is available sooner.
@@ -80,18 +86,40 @@ async def serve(
 ) -> None:
     """Serve until interrupted. Port 0 takes a free port; the address is printed.
 
-    ``ready`` is awaited once the server answers, before the address is printed.
+    ``ready`` is awaited once the server answers, before the address is printed. Where a server of
+    this state folder runs already, its page is opened if that was asked for, and nothing started.
 
     Raises:
         Busy: another server uses the state folder.
         NotAllowed: the port is in use, the certificate is not valid, or others could have access
             without an account.
     """
-    bench.records.claim()
+    try:
+        bench.records.claim()
+    except Busy:
+        if not (serving.open_page and await _answers(serving)):
+            raise
+        shown = _address(serving, None, serving.port)
+        print_text("printed.server-runs-already", url=shown)
+        webbrowser.open(shown)
+        return
     try:
         await _serve_claimed(bench, serving, ready)
     finally:
         bench.records.release()
+
+
+async def _answers(serving: Serving) -> bool:
+    """Whether a servodeck answers at this address of this computer."""
+    if not serving.on_loopback or serving.port == 0:
+        return False
+    address = f"{_address(serving, None, serving.port)}api/v1/health"
+    try:
+        async with httpx.AsyncClient(timeout=_LOOK_S, trust_env=False) as client:
+            Health.model_validate_json((await client.get(address)).content)
+    except (httpx.HTTPError, ValidationError):
+        return False
+    return True
 
 
 async def _serve_claimed(
@@ -291,7 +319,7 @@ def _listen(host: str, port: int) -> AcceptingSocket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     # With the protocol given, asyncio disables Nagle's algorithm, so small answers are not delayed.
     listening = AcceptingSocket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    take_port_alone(listening)
     try:
         listening.bind((host.strip("[]"), port))
     except socket.gaierror as error:

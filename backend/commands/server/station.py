@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 from urllib.parse import quote
@@ -16,6 +17,8 @@ from backend.commands.base.state import state_folder
 from backend.station.box.kept import Box, keep, read
 from backend.station.box.roles import addresses_of, checked
 from backend.station.service import systemd_unit
+from backend.station.windows_task import windows_task
+from backend.store.files import write_atomically
 from drivers.computer.interfaces import network_interfaces
 
 app = typer.Typer(help="A station as a service.", no_args_is_help=True)
@@ -30,6 +33,25 @@ def station() -> None:
 def unit() -> None:
     """Print the systemd unit, with the capabilities that EtherCAT needs."""
     print(systemd_unit(), end="")
+
+
+@app.command("task")
+def task(
+    out: Annotated[Path, typer.Argument(help="file to write, as servodeck-task.xml")],
+    config: Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")] = None,
+) -> None:
+    """Write the task that starts servodeck on Windows when its user logs in; for schtasks."""
+    arguments = ["-m", "backend", "serve"]
+    if config is not None:
+        arguments += ["--config", str(config.resolve())]
+
+    async def work() -> None:
+        # The form of Windows' own files of tasks: UTF-16 with its mark.
+        written = windows_task(sys.executable, arguments).replace("\n", "\r\n")
+        write_atomically(out, written.encode("utf-16"))
+        print_text("printed.task-written", file=str(out))
+
+    run(work)
 
 
 Config = Annotated[Path | None, typer.Option(help="folder of drives and parameter sets")]

@@ -26,6 +26,7 @@ from backend.library.backup.copy import copy_rows
 from backend.store.database import FILE, Store
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
+from profiles.replacing import move_into_place
 
 FORMAT = "servodeck backup"
 VERSION = 1
@@ -70,9 +71,10 @@ def make_backup(
             unfinished = Path(folder) / "backup.zip"
             parts = _write(store, unfinished, Path(folder), recordings=recordings)
             unfinished.chmod(0o600)  # password hashes and keys are in it
-            with unfinished.open("rb") as file:
+            # Open for writing, which flushing on Windows asks for (FlushFileBuffers).
+            with unfinished.open("r+b") as file:
                 os.fsync(file.fileno())
-            unfinished.replace(archive)
+            move_into_place(unfinished, archive)
     except OSError as error:
         raise StorageFailed(
             "store.backup-not-written",

@@ -17,6 +17,7 @@ from backend.store import state_version
 from backend.store.database import FILE, Store
 from backend.store.files import StorageFailed
 from backend.store.lock import FolderLock
+from drivers.computer.files import FOLDERS_MOVE_WHILE_OPEN
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,10 @@ def restore(
                 parts = _unpack(archive, fresh)
                 entries = _check(fresh, str(archive))
                 copied = _fill(fresh, database) if database else 0
+                if not FOLDERS_MOVE_WHILE_OPEN:
+                    # The lock is a file of the folder, and would prevent its renaming, as does
+                    # every file that another process has open there: that protects it now.
+                    lock.give()
                 aside = _put_in_place(fresh, folder)
         except OSError as error:
             raise StorageFailed(

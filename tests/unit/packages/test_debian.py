@@ -62,6 +62,68 @@ class Root:
         return result.stdout + result.stderr
 
 
+PROGRAMS = ("systemctl", "udevadm", "getent", "adduser", "deluser", "chown")
+
+
+def scripted(tmp_path: Path, script: str, *arguments: str, here: tuple[str, ...]) -> list[str]:
+    """What a maintainer's script does on a running system: its calls, none carried out."""
+    programs, calls = tmp_path / "programs", tmp_path / "calls"
+    shutil.rmtree(programs, ignore_errors=True)
+    programs.mkdir()
+    calls.write_text("")
+    for name in here:
+        stand_in = programs / name
+        stand_in.write_text(f'#!/bin/sh\necho "{name} $*" >> {calls}\n')
+        stand_in.chmod(0o755)
+    for name in ("find", "mkdir", "chmod", "rm"):
+        (programs / name).symlink_to(shutil.which(name) or name)
+    system = tmp_path / "system"
+    (system / "run/systemd/system").mkdir(parents=True, exist_ok=True)
+    absolute = script.replace("/run/systemd", f"{system}/run/systemd")
+    absolute = absolute.replace("$DPKG_ROOT/", f"{system}/")
+    done = subprocess.run(
+        ["/bin/sh", "-c", absolute, "script", *arguments],
+        env={"PATH": str(programs)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return calls.read_text().splitlines()
+
+
+def test_an_upgrade_stops_the_program_before_its_files_are_replaced(tmp_path: Path) -> None:
+    """It imports modules when they are needed: half of them would be of the new version."""
+    stopped = scripted(tmp_path, debian._BEFORE_REMOVAL, "upgrade", "0.3.0", here=PROGRAMS)
+    assert stopped == ["systemctl stop servodeck.service"]
+    started = scripted(tmp_path, debian._AFTER_INSTALL, "configure", "0.2.0", here=PROGRAMS)
+    assert started[-1] == "systemctl restart servodeck.service"
+    assert "udevadm trigger --action=add --subsystem-match=usb-serial" in started
+
+
+@pytest.mark.parametrize(
+    ("why", "started"),
+    [("abort-upgrade", "start"), ("abort-remove", "enable --now"), ("abort-deconfigure", "start")],
+)
+def test_after_a_refused_downgrade_the_station_runs_again(
+    tmp_path: Path, why: str, started: str
+) -> None:
+    calls = scripted(tmp_path, debian._AFTER_INSTALL, why, "0.1.0", here=PROGRAMS)
+    assert calls[-1] == f"systemctl {started} servodeck.service"
+
+
+def test_removing_works_where_its_folder_or_deluser_is_gone(tmp_path: Path) -> None:
+    removed = scripted(tmp_path, debian._BEFORE_REMOVAL, "remove", here=PROGRAMS)
+    assert removed == ["systemctl disable --now servodeck.service"]
+    assert scripted(tmp_path, debian._AFTER_REMOVAL, "remove", here=PROGRAMS) == [
+        "systemctl daemon-reload"
+    ]
+    assert "deluser --quiet --system servodeck" in scripted(
+        tmp_path, debian._AFTER_REMOVAL, "purge", here=PROGRAMS
+    )
+    few = tuple(name for name in PROGRAMS if name != "deluser")
+    assert scripted(tmp_path, debian._AFTER_REMOVAL, "purge", here=few) == [
+        "getent passwd servodeck"
+    ]
+
+
 def test_from_installing_to_purging(tmp_path: Path, site: Path) -> None:
     first, second = (debian.build(site, tmp_path, version) for version in ("0.1.0", "0.2.0"))
     root = Root(tmp_path / "root")

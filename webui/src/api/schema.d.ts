@@ -52,6 +52,36 @@ export interface paths {
         patch: operations["change_account"];
         trace?: never;
     };
+    "/api/v1/adapters/latency-timer": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Latency Timer
+         * @description Read the latency timer of a serial adapter, and what it costs.
+         */
+        get: operations["latency_timer"];
+        /**
+         * Set Latency Timer
+         * @description Set the latency timer of a serial adapter; its first value is stored and can be restored.
+         *
+         *     On Windows the adapter is restarted, which no program may use meanwhile.
+         */
+        put: operations["set_latency_timer"];
+        post?: never;
+        /**
+         * Restore Latency Timer
+         * @description Restore the latency timer that an adapter had before servodeck changed it.
+         */
+        delete: operations["restore_latency_timer"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/v1/audit": {
         parameters: {
             query?: never;
@@ -8047,6 +8077,12 @@ export interface components {
             problems: string[];
         };
         /**
+         * InForce
+         * @description Whether a changed timer is in force: now, or only after the adapter was plugged in again.
+         * @enum {string}
+         */
+        InForce: "now" | "after_replug";
+        /**
          * InertiaAnswer
          * @description Result; values are None where not finite, and valid only where ``identifiable``.
          */
@@ -8602,6 +8638,66 @@ export interface components {
             below_us: number | null;
             /** Count */
             count: number;
+        };
+        /**
+         * LatencyRequest
+         * @description The latency timer that a serial adapter is to have.
+         */
+        LatencyRequest: {
+            /**
+             * Device
+             * @description serial port, as COM3 or /dev/ttyUSB0
+             */
+            device: string;
+            /**
+             * Ms
+             * @default 1
+             */
+            ms: number;
+        };
+        /**
+         * LatencyTimerInfo
+         * @description The latency timer of a serial adapter.
+         *
+         *     ``..._at_most`` are bounds from the timer alone; ``reads_measured`` and ``reads_before`` are
+         *     measured on the bus. All in reads per second, one after another.
+         */
+        LatencyTimerInfo: {
+            /**
+             * Before Ms
+             * @description timer before servodeck changed it, to be restored
+             */
+            before_ms: number | null;
+            /** Device */
+            device: string;
+            /** @description of a change just made; None: none was made, or somebody changed it since */
+            in_force: components["schemas"]["InForce"] | null;
+            /** Lowered Ms */
+            lowered_ms: number;
+            /** Lowered Reads At Most */
+            lowered_reads_at_most: number;
+            /**
+             * Ms
+             * @description None: the adapter has none that is known
+             */
+            ms: number | null;
+            /** Reads At Most */
+            reads_at_most: number | null;
+            /**
+             * Reads Before
+             * @description measured before the change
+             */
+            reads_before: number | null;
+            /**
+             * Reads Measured
+             * @description of the bus that is open at this port
+             */
+            reads_measured: number | null;
+            /**
+             * Restarts
+             * @description a change restarts the adapter; no program may use it then
+             */
+            restarts: boolean;
         };
         /**
          * Lease
@@ -14009,6 +14105,7 @@ export type IdentifyRequest = components['schemas']['IdentifyRequest'];
 export type ImportFinding = components['schemas']['ImportFinding'];
 export type ImportedDescription = components['schemas']['ImportedDescription'];
 export type ImportedList = components['schemas']['ImportedList'];
+export type InForce = components['schemas']['InForce'];
 export type InertiaAnswer = components['schemas']['InertiaAnswer'];
 export type InertiaIntervals = components['schemas']['InertiaIntervals'];
 export type InertiaRequest = components['schemas']['InertiaRequest'];
@@ -14025,6 +14122,8 @@ export type JogStart = components['schemas']['JogStart'];
 export type JogStop = components['schemas']['JogStop'];
 export type JoinAsGuest = components['schemas']['JoinAsGuest'];
 export type LateBin = components['schemas']['LateBin'];
+export type LatencyRequest = components['schemas']['LatencyRequest'];
+export type LatencyTimerInfo = components['schemas']['LatencyTimerInfo'];
 export type Lease = components['schemas']['Lease'];
 export type LeaseAnswer = components['schemas']['LeaseAnswer'];
 export type LeaseAsk = components['schemas']['LeaseAsk'];
@@ -14672,6 +14771,427 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["AccountInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    latency_timer: {
+        parameters: {
+            query: {
+                /** @description serial port, as COM3 or /dev/ttyUSB0 */
+                device: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LatencyTimerInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    set_latency_timer: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LatencyRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LatencyTimerInfo"];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restore_latency_timer: {
+        parameters: {
+            query: {
+                /** @description serial port, as COM3 or /dev/ttyUSB0 */
+                device: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LatencyTimerInfo"];
                 };
             };
             /** @description Not a request of this interface */

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from profiles.replacing import move_into_place
 from profiles.schema import Raw
 
 
@@ -48,7 +49,7 @@ class Nvm:
                     json.dump({"format": 1, "values": dict(values)}, file, indent=1)
                     file.flush()
                     os.fsync(file.fileno())
-                Path(name).replace(self._path)
+                move_into_place(Path(name), self._path)
             except OSError:
                 Path(name).unlink(missing_ok=True)
                 raise

@@ -50,4 +50,35 @@ export const preflight = {
     'Left as they are, because they were changed since: {settings}',
     '以下设置此后被更改过，保持不变：{settings}',
   ],
+  'latency.is': [
+    'The adapter at {device} holds answers back for up to {ms} ms (latency timer).',
+    '{device} 上的适配器最多延迟应答 {ms} ms（延迟计时器）。',
+  ],
+  'latency.bound': [
+    'By it alone at most {reads} reads per second, one after another.',
+    '仅由它决定，逐次读取每秒最多 {reads} 次。',
+  ],
+  'latency.measured': [
+    'Measured on this bus: {reads} reads per second.',
+    '在此总线上测得：每秒 {reads} 次读取。',
+  ],
+  'latency.before': ['Before servodeck changed it: {ms} ms.', 'servodeck 更改之前：{ms} ms。'],
+  'latency.measuredBefore': [
+    'Measured then: {reads} reads per second.',
+    '当时测得：每秒 {reads} 次读取。',
+  ],
+  'latency.replug': [
+    'Not yet in force: unplug {device} and plug it in again.',
+    '尚未生效：请拔下 {device} 再插上。',
+  ],
+  'latency.gain': [
+    'At {ms} ms at most {reads} reads per second are possible: computed, not measured.',
+    '设为 {ms} ms 时每秒最多可读取 {reads} 次：计算值，未测量。',
+  ],
+  'latency.restarts': [
+    'The change restarts the adapter and needs an administrator of the computer; close its bus first.',
+    '更改会重启适配器，并需要计算机管理员权限；请先关闭其总线。',
+  ],
+  'latency.lower': ['Lower to {ms} ms', '调低到 {ms} ms'],
+  'latency.restore': ['Restore {ms} ms', '恢复为 {ms} ms'],
 } satisfies Texts

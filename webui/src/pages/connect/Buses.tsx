@@ -7,6 +7,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { CyclicExchange } from './CyclicExchange'
+import { LatencyTimer } from './LatencyTimer'
 import { QualityTable } from './QualityTable'
 import { DoctorCard } from './segment/DoctorCard'
 import { SegmentPanel } from './segment/SegmentPanel'
@@ -49,6 +50,7 @@ export function Buses() {
             <Icon name="download" /> {t('segment.frames')}
           </a>
           <QualityTable quality={bus.quality} />
+          <LatencyTimer url={bus.url} />
           {bus.kind === 'ethercat' && <SegmentPanel url={bus.url} />}
           {(bus.kind === 'ethercat' || bus.kind === 'canopen') && <DoctorCard url={bus.url} />}
           {bus.cyclic_possible && <CyclicExchange bus={bus} onChange={refresh} />}

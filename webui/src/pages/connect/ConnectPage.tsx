@@ -11,6 +11,7 @@ import { BenchDrive } from './BenchDrive'
 import { Buses } from './Buses'
 import { ConnectHelp } from './ConnectHelp'
 import { NotListedPanel } from './NotListed'
+import { LatencyTimer } from './LatencyTimer'
 import { Preflight } from './Preflight'
 import { Scan } from './Scan'
 import { StationBox } from './StationBox'
@@ -113,6 +114,7 @@ export function ConnectPage() {
             onChange={(event) => setUrl(event.currentTarget.value)}
           />
           <InterfacePermissions url={url.trim()} />
+          <LatencyTimer url={url.trim()} />
           <Scan url={url.trim()} onUrl={setUrl} />
         </Panel>
         <Panel title={t('connect.bench')}>

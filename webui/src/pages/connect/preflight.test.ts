@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import { interfaceOf } from './preflight'
+import { interfaceOf, serialPortOf } from './preflight'
 
 describe('the interface of a bus URL', () => {
   it('is that of a real EtherCAT bus', () => {
@@ -12,4 +12,18 @@ describe('the interface of a bus URL', () => {
       expect(interfaceOf(url)).toBe('')
     }
   })
+})
+
+describe('the serial port of a bus URL', () => {
+  it.each([
+    ['mlink://COM3', 'COM3'],
+    ['modbus:///dev/ttyUSB0?baudrate=115200&parity=N', '/dev/ttyUSB0'],
+    ['canopen://slcan/COM12?bitrate=1000000', 'COM12'],
+    ['canopen://slcan/%2Fdev%2FttyUSB1', '/dev/ttyUSB1'],
+  ])('of %s is %s', (url, port) => expect(serialPortOf(url)).toBe(port))
+
+  it.each(['', 'mlink://virtual0', 'ethercat://eth0', 'canopen://socketcan/can0', 'COM3'])(
+    'is none of %s',
+    (url) => expect(serialPortOf(url)).toBe(''),
+  )
 })
