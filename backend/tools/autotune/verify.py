@@ -23,7 +23,6 @@ from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
 from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
-    BLURRED_DEG,
     COHERENT,
     LINES,
     MARGIN_DB,
@@ -32,6 +31,7 @@ from backend.tools.autotune.verdict import (
     WITHIN,
     in_words,
     misses,
+    sharp,
     sharp_lines,
     verdict_of,
 )
@@ -218,7 +218,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     lines above the bandwidth are left, the crossover is not among them.
     """
     frf = swept.frf
-    use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
+    use = sharp(frf)
     if np.count_nonzero(use) < LINES:
         return {}
     f, closed = frf.frequency_hz[use], frf.response[use]
