@@ -101,6 +101,9 @@ class autotune_gains:
     """[count] Origin: 66bd184e with benchmarks/tune_accuracy."""
     SHORTEST_S = 0.1e-3
     """[s] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    MORE = 1.05
+    """[ratio] By so much a gain may exceed its design where a raw value is rounded: 0.4 dB of the
+    1.5 dB that a design has in reserve. Origin: tests/unit/backend/test_loop_gains.py."""
     LOOP_PERIOD_S = 50e-6
     """[s] Loop period of the drives: half of it to compute, half of it until the torque's mean
     follows. Origin: e01bb3d6."""
