@@ -73,14 +73,16 @@ class Missed:
 class LoopVerdict:
     """``measured`` over its band, ``predicted`` beyond it, and the worst case of both.
 
-    ``last_crossover_hz`` is the highest crossover of all possible loops. ``coverage``: all
-    crossings are measured; or those beyond the band are bounded by a measurement with the gain
-    raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
-    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals;
-    60 dB and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the
-    prediction by the measured lines. ``designed`` is `predicted` for the plants of the design
-    alone; it decides whether the design is kept. ``contradicted``: the loop was stable with a
-    raised gain at which none of the possible ones is, so that nothing is known beyond the band.
+    ``measured`` is None where the lines begin above the loop's crossover: what they show counts in
+    ``stated``, but they cover no crossover. ``last_crossover_hz`` is the highest crossover of all
+    possible loops. ``coverage``: all crossings are measured; or those beyond the band are bounded
+    by a measurement with the gain raised by ``shown_gain_db``; or they are only predicted, with
+    which no design is kept. ``stated`` are the worst figures of both bands, ``worst`` the ends of
+    their intervals; 60 dB and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the
+    corrections of the prediction by the measured lines. ``designed`` is `predicted` for the plants
+    of the design alone; it decides whether the design is kept. ``contradicted``: the loop was
+    stable with a raised gain at which none of the possible ones is, so that nothing is known
+    beyond the band.
     """
 
     measured: BandVerdict | None
@@ -174,9 +176,9 @@ def judge(
     not include and no measurement excludes above its band: where a raised gain does not exclude
     them either, they widen the stated intervals there.
     """
-    measured, top = None, 0.0
+    seen = None
     if lines is not None and lines.frequency_hz.size >= threshold.FEW:
-        measured, top = _measured(lines), float(lines.frequency_hz[-1])
+        seen = _measured(lines)
     delay, gain = (
         _known(late_s, threshold.LATE_S, threshold.UNSEEN_S),
         _known(size, threshold.SIZE, threshold.UNSEEN),
@@ -195,6 +197,11 @@ def judge(
     over = np.abs(possible) > 1.0
     crossing = np.flatnonzero(np.any(over[:, 1:] != over[:, :-1], axis=0))
     last = float(frequency_hz[crossing[-1] + 1]) if crossing.size else 0.0
+    measured = seen
+    if lines is not None and crossing.size and _begins_beyond(lines):
+        # What the lines show counts, but the margin of that crossover is not among it.
+        measured = None
+    top = 0.0 if measured is None else measured.high_hz
     coverage: Coverage = "measured" if last <= top else "predicted"
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
@@ -207,11 +214,16 @@ def judge(
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
     beyond = _beyond(frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db)
-    stated, worst = _worst(measured, beyond)
+    stated, worst = _worst(seen, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
         delay, _in_db(gain), contradicted, designed,
     )  # fmt: skip
+
+
+def _begins_beyond(lines: Lines) -> bool:
+    """Whether the lines begin above a crossover: an integral part has more than 0 dB below it."""
+    return bool(np.abs(lines.closed[0]) <= np.abs(1.0 - lines.closed[0]))
 
 
 def _in_db(size: Interval) -> Interval:

@@ -103,6 +103,25 @@ def test_a_crossover_above_the_band_keeps_no_design() -> None:
     assert [m.what for m in found.missed(PROMISED, 1.0, 1.0, 1.03)] == ["coverage"]
 
 
+def test_a_crossover_below_the_band_is_not_measured() -> None:
+    """4 Hz with 20 ms: 61° that no line from 5 Hz on shows, and 9.9 dB that they do."""
+    found = verdict_of(4.0, 20e-3, 246.0)
+    assert (found.coverage, found.measured) == ("predicted", None)
+    assert [m.what for m in found.missed(Goals(9.0, 48.0, 1.8), 1.0, 1.0, 1.03)] == ["coverage"]
+    true_deg = 90 - 360 * 4.0 * 20e-3
+    assert found.stated.phase_margin_deg == pytest.approx(true_deg, abs=1.0)
+    assert found.worst.phase_margin_deg < true_deg
+    assert found.stated.gain_margin_db == pytest.approx(20 * np.log10(12.5 / 4.0), abs=0.3)
+    # What the lines show still counts: of 30 ms here, 20 ms were predicted.
+    late = verdict_of(4.0, 30e-3, 246.0, predicted_s=20e-3)
+    assert late.stated.gain_margin_db == pytest.approx(20 * np.log10(25.0 / 12.0), abs=0.4)
+    assert verdict_of(4.0, 20e-3, 246.0, shown_db=6.0).coverage == "gain_steps"
+    # One that crosses just above the first line is measured, whatever its uncertainty.
+    just = verdict_of(5.2, 20e-3, 246.0)
+    assert just.coverage == "measured"
+    assert just.measured is not None
+
+
 def test_a_raised_gain_covers_it() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0, shown_db=6.5)
     assert found.coverage == "gain_steps"
