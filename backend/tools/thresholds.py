@@ -1106,6 +1106,9 @@ class step_evaluate:
     noise. Origin: ed1a5f9a with benchmarks/rough_campaign."""
     LEAD_S = 0.05
     """[s] Rest before the step. Origin: 66bd184e with benchmarks/tune_accuracy."""
+    GAP_S = 0.003
+    """[s] Longest gap in the samples that hides no peak and no departure from the window: a loop
+    of 100 Hz overshoots for 5 ms. Origin: tests/unit/backend/test_step_lost.py."""
 
 
 class sweep_evaluation:

@@ -245,6 +245,8 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
 def restless(step: step_evaluation.StepResult) -> Text | None:
     """Message that a loop with too few usable lines has no well-damped step either; else None."""
     found = step.step
+    if found is not None and "overshoot_percent" in step_evaluation.unknown_figures(found):
+        return text("autotune.few-lines-lost")
     if found is not None and found.overshoot_percent <= threshold.OVERSHOOT_PERCENT:
         return None
     return text("autotune.few-lines")

@@ -25,6 +25,7 @@ autotune_designs-not-verified = { $count ->
     } not verified and not applied: the time for one tuning was used up
 autotune_faster-designs-left = { $step } of { $steps }: the previous settings are faster than the remaining designs
 autotune_few-lines = too few lines of the tuned loop could be measured, and its step overshoots
+autotune_few-lines-lost = too few lines of the tuned loop could be measured, and samples of its step were lost on the bus
 autotune_frequency-response = { $step } of { $steps }: frequency response
 autotune_gain-below-least = { $drive }: the least value of { $gain } ({ $parameter }) is { NUM($more, format: ".2g") } times the designed gain
     .remedy = keep the present gains, or set them by hand

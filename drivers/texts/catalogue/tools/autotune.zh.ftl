@@ -22,6 +22,7 @@ autotune_designing-axis-loop-shows = 第 { $step } 步（共 { $steps } 步）�
 autotune_designs-not-verified = { $count } 个方案未验证，因此未应用：单次整定的时间已用完
 autotune_faster-designs-left = 第 { $step } 步（共 { $steps } 步）：原有设置比剩余的方案更快
 autotune_few-lines = 整定后环路可测的谱线太少，且阶跃有超调
+autotune_few-lines-lost = 整定后环路可测的谱线太少，且其阶跃有采样在总线上丢失
 autotune_frequency-response = 第 { $step } 步（共 { $steps } 步）：频率响应
 autotune_gain-below-least = { $drive }：{ $gain }（{ $parameter }）的最小可设值为设计增益的 { NUM($more, format: ".2g") } 倍
     .remedy = 请保留当前增益，或手动设定
