@@ -137,7 +137,6 @@ def verdict_of(
         return judge(
             None, dense, every, nominal, shown_gain_db=shown_gain_db, alternatives=alternatives
         )
-    crossing = sharp_lines(frf) is not None
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
     paths = reference_paths(
@@ -150,7 +149,7 @@ def verdict_of(
     )
     found = [
         judge(
-            Lines(f, path.closed, seen.deviation) if crossing else None,
+            Lines(f, path.closed, seen.deviation),
             dense,
             every,
             nominal,
@@ -173,13 +172,13 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
         elif each.what == "stability":
             said.append(text("autotune.not-stable"))
         elif each.what == "coverage":
-            said.append(
-                text(
-                    "autotune.crossover-above-measured",
-                    crossover_hz=each.value,
-                    measured_hz=each.limit,
-                )
+            below = each.value < each.limit
+            code = (
+                "autotune.crossover-below-measured"
+                if below
+                else "autotune.crossover-above-measured"
             )
+            said.append(text(code, crossover_hz=each.value, measured_hz=each.limit))
         else:
             code, unit = _MARGINS.get((each.what, each.end)) or _STATED[each.what]
             said.append(Text(code, {f"have{unit}": each.value, f"wanted{unit}": each.limit}))

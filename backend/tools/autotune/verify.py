@@ -150,7 +150,7 @@ async def verify(
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(guaranteed, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
-    blurred = blurred or (verdict is not None and verdict.measured is None)
+    blurred = blurred or (verdict is not None and sharp_lines(swept.frf) is None)
     as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), threshold.DOUBTED)
     every: Frf | None = None
     if (not read or blurred or not as_predicted) and pairs > 1 and not missed:
@@ -313,22 +313,21 @@ def otherwise(verified: Verified) -> Text | None:
 
 
 def unseen(last_hz: float | None, verified: Verified) -> Text | None:
-    """Note that the highest possible crossover lies above the verified band; None otherwise.
+    """Note that a possible crossover lies outside the verified band; None otherwise.
 
     Above its resonances, the motor of a compliant axis is decoupled and lighter: its loop may cross
     0 dB for the last time at a frequency that the samples of this exchange do not show.
     """
     verdict = verified.verdict
     if verdict is not None:
-        if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
+        gain_db = verdict.shown_gain_db
+        if verdict.coverage != "gain_steps" or gain_db is None or verdict.uncovered is None:
             return None
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        return text(
-            "autotune.margins-bounded",
-            crossover_hz=verdict.last_crossover_hz,
-            measured_hz=top,
-            gain_db=verdict.shown_gain_db,
-        )
+        crossover_hz, end_hz = verdict.uncovered
+        code = "autotune.margins-bounded"
+        if crossover_hz < end_hz:
+            code = "autotune.margins-below-bounded"
+        return text(code, crossover_hz=crossover_hz, measured_hz=end_hz, gain_db=gain_db)
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):
