@@ -220,4 +220,6 @@ def _numbers(view: StepAnswer, words: Words) -> dict[str, str]:
         ("torque_peak", fixed(view.torque_peak_percent, 0, "%")),
         ("torque_rms", fixed(view.torque_rms_percent, 0, "%")),
     ]
+    if view.lost_percent > 0.0:
+        rows.append(("samples_lost", fixed(view.lost_percent, 1, "%")))
     return {words(name): text for name, text in rows}

@@ -117,6 +117,8 @@ def _step_verdict(view: StepAnswer, kind: str, words: Words) -> Note:
     numbers = view.step or view.move
     settled = numbers is not None and numbers.settling_s is not None
     settling = milliseconds(numbers.settling_s) if numbers and settled else words("not_reached")
+    if "settling_s" in view.unknown:
+        settling = words("not_known")
     # The overshoot that a machine tolerates is not known: figures only, without a judgement.
     tone: Tone = "plain" if settled else "warn"
     if view.move is not None:

@@ -125,6 +125,8 @@ TEXTS: dict[str, tuple[str, str]] = {
     "torque_peak": ("Torque peak", "转矩峰值"),
     "torque_rms": ("Torque RMS", "转矩有效值"),
     "not_reached": ("not reached", "未达到"),
+    "not_known": ("not known", "未知"),
+    "samples_lost": ("Samples not received", "未收到的采样"),
     "window_widened": ("Settling window, ten times the noise", "稳定窗口（噪声的十倍）"),
     "verdict.band": ("Margins by band", "各频段裕度"),
     "verdict.measured": ("measured", "测得"),

@@ -101,6 +101,9 @@ class autotune_gains:
     """[count] Origin: 66bd184e with benchmarks/tune_accuracy."""
     SHORTEST_S = 0.1e-3
     """[s] Origin: 66bd184e with benchmarks/tune_accuracy."""
+    MORE = 1.05
+    """[ratio] By so much a gain may exceed its design where a raw value is rounded: 0.4 dB of the
+    1.5 dB that a design has in reserve. Origin: tests/unit/backend/test_loop_gains.py."""
     LOOP_PERIOD_S = 50e-6
     """[s] Loop period of the drives: half of it to compute, half of it until the torque's mean
     follows. Origin: e01bb3d6."""
@@ -532,6 +535,14 @@ class inertia_probe:
     GAINED = 0.1
     """[ratio] Share of the energy moved to and fro that noise alone does not make. Origin: 7166e5a3
     with benchmarks/tune_accuracy."""
+    # RIGID, AGAINST: A fitted inertia below this share of what the momentum of the pulse gives is not
+    # that of a rigid body; one below minus that share is of a body that moves against its torque.
+    # Simulated: 0.7 to 1 for rigid axes, down to -0.2 for 12 times the motor on a coupling of 2 to
+    # 8 Hz.
+    RIGID = 0.25
+    """[ratio] Origin: tests/unit/backend/test_probe_judged.py."""
+    AGAINST = 0.5
+    """[ratio] Origin: tests/unit/backend/test_probe_judged.py."""
     SMOOTHED_S = 0.02
     """[s] A motion of some tenths of a second, a mean over so many seconds of which hides nothing.
     Origin: dc38bcd8."""
@@ -1103,6 +1114,9 @@ class step_evaluate:
     noise. Origin: ed1a5f9a with benchmarks/rough_campaign."""
     LEAD_S = 0.05
     """[s] Rest before the step. Origin: 66bd184e with benchmarks/tune_accuracy."""
+    GAP_S = 0.003
+    """[s] Longest gap in the samples that hides no peak and no departure from the window: a loop
+    of 100 Hz overshoots for 5 ms. Origin: tests/unit/backend/test_step_lost.py."""
 
 
 class sweep_evaluation:

@@ -1,11 +1,11 @@
 """Margins of a tuned loop, measured within the measured band and predicted beyond it.
 
-A closed loop is measured up to a frequency; its last crossover may lie above it. Within the band
-margins are read from the lines, with the interval that the lines' deviations give. Beyond it they
-are those of a set of loops: every plant of the design, shifted by the gain and delay (with their
-deviations) by which the measured lines differ from the prediction. The verdict is the worst of
-both. A measurement that shows a gain margin directly (the loop is stable with so much more gain)
-removes those loops from the set that contradict it.
+A closed loop is measured over a band; its first crossover may lie below it, and its last above.
+Within the band margins are read from the lines, with the interval that the lines' deviations
+give. Beyond it they are those of a set of loops: every plant of the design, shifted by the gain
+and delay (with their deviations) by which the measured lines differ from the prediction. The
+verdict is the worst of both. A measurement that shows a gain margin directly (the loop is stable
+with so much more gain) removes those loops from the set that contradict it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from backend.analysis.loop.loop_goals import Goals, sensitivity_peak, stable, worst_of
-from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import loop_verdict as threshold
 
 #: Standard deviations to either side of a value that give a 95 % interval.
@@ -73,11 +73,13 @@ class Missed:
 class LoopVerdict:
     """``measured`` over its band, ``predicted`` beyond it, and the worst case of both.
 
-    ``last_crossover_hz`` is the highest crossover of all possible loops. ``coverage``: all
-    crossings are measured; or those beyond the band are bounded by a measurement with the gain
-    raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
-    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals;
-    60 dB and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the
+    ``predicted`` covers what lies above the band and, where the lines begin above a crossover, what
+    lies below it. ``last_crossover_hz`` is the highest crossover of all possible loops.
+    ``uncovered`` is a crossover that no line covers, and the end of the band next to it [Hz].
+    ``coverage``: all crossings are measured; or the others are bounded by a measurement with the
+    gain raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
+    ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals; 60 dB
+    and 90° where no crossing is known. ``delay_s`` and ``gain_db`` are the corrections of the
     prediction by the measured lines. ``designed`` is `predicted` for the plants of the design
     alone; it decides whether the design is kept. ``contradicted``: the loop was stable with a
     raised gain at which none of the possible ones is, so that nothing is known beyond the band.
@@ -95,6 +97,7 @@ class LoopVerdict:
     gain_db: Interval
     contradicted: bool = False
     designed: BandVerdict | None = None
+    uncovered: tuple[float, float] | None = None
 
     def missed(
         self, guaranteed: Goals, margin_deg: float, margin_db: float, ms_ratio: float
@@ -110,9 +113,8 @@ class LoopVerdict:
             found.append(Missed("contradiction", self.shown_gain_db or 0.0, 0.0))
         if not self.stable:
             found.append(Missed("stability", 0.0, 1.0))
-        if self.coverage == "predicted":
-            band = self.measured.high_hz if self.measured is not None else 0.0
-            found.append(Missed("coverage", self.last_crossover_hz, band))
+        if self.coverage == "predicted" and self.uncovered is not None:
+            found.append(Missed("coverage", *self.uncovered))
         pairs: tuple[tuple[Missing, float, float, float], ...] = (
             ("phase_margin", self.stated.phase_margin_deg, guaranteed.phase_margin_deg, margin_deg),
             ("gain_margin", self.stated.gain_margin_db, guaranteed.gain_margin_db, margin_db),
@@ -174,9 +176,9 @@ def judge(
     not include and no measurement excludes above its band: where a raised gain does not exclude
     them either, they widen the stated intervals there.
     """
-    measured, top = None, 0.0
+    seen = None
     if lines is not None and lines.frequency_hz.size >= threshold.FEW:
-        measured, top = _measured(lines), float(lines.frequency_hz[-1])
+        seen = _measured(lines)
     delay, gain = (
         _known(late_s, threshold.LATE_S, threshold.UNSEEN_S),
         _known(size, threshold.SIZE, threshold.UNSEEN),
@@ -192,26 +194,70 @@ def judge(
         # statement.
         contradicted = not left.size
         possible = possible if contradicted else left
-    over = np.abs(possible) > 1.0
-    crossing = np.flatnonzero(np.any(over[:, 1:] != over[:, :-1], axis=0))
-    last = float(frequency_hz[crossing[-1] + 1]) if crossing.size else 0.0
-    coverage: Coverage = "measured" if last <= top else "predicted"
+    gap = _gap(lines if seen is not None else None, frequency_hz, possible)
+    coverage: Coverage = "measured" if gap.uncovered is None else "predicted"
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
     nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
-    designed = _beyond(frequency_hz, possible, nominal_only, top)
+    designed = _beyond(frequency_hz, possible, nominal_only, gap)
     sound = bool(np.all(stable(possible)))
     every = possible
     if alternatives is not None and shown_gain_db is not None:
         others = _moved(frequency_hz, alternatives, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
-    beyond = _beyond(frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db)
-    stated, worst = _worst(measured, beyond)
+    beyond = _beyond(frequency_hz, every, nominal_only, gap, threshold.PER_OCTAVE, shown_gain_db)
+    stated, worst = _worst(seen, beyond)
     return LoopVerdict(
-        measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
-        delay, _in_db(gain), contradicted, designed,
+        seen, beyond, gap.last_hz, coverage, shown_gain_db, stated, worst, sound,
+        delay, _in_db(gain), contradicted, designed, gap.uncovered,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Gap:
+    """What the lines do not cover: the dense grid up to ``below`` and from ``above`` on.
+
+    ``below`` and ``above`` are indices, ``below`` 0 where nothing is open there. ``top_hz`` is the
+    end of the measured band, ``last_hz`` the highest crossover, ``uncovered`` as in `LoopVerdict`.
+    """
+
+    below: int
+    above: int
+    top_hz: float
+    last_hz: float
+    uncovered: tuple[float, float] | None
+
+
+def _gap(lines: Lines | None, frequency_hz: FloatArray, possible: ComplexArray) -> _Gap:
+    over = np.abs(possible) > 1.0
+    crosses = over[:, 1:] != over[:, :-1]
+    at = np.flatnonzero(np.any(crosses, axis=0))
+    first, last = (
+        (float(frequency_hz[at[0]]), float(frequency_hz[at[-1] + 1])) if at.size else (0.0, 0.0)
+    )
+    if lines is None:
+        return _Gap(0, 0, 0.0, last, (last, 0.0) if at.size else None)
+    low, top = float(lines.frequency_hz[0]), float(lines.frequency_hz[-1])
+    # The segment that the end of the band lies in belongs to both: no crossover is between them.
+    below = 0
+    above = max(int(np.searchsorted(frequency_hz, top, "right")) - 1, 0)
+    uncovered = (last, top) if last > top else None
+    if at.size and not _amplifies(lines.closed[0]):
+        # Above all crossovers, or below one that an integral part has: it lies below the lines.
+        below = int(np.searchsorted(frequency_hz, low)) + 1
+        uncovered = uncovered or (min(first, low), low)
+    if at.size and _amplifies(lines.closed[-1]):
+        # The loop crosses above the lines, also where the prediction does before their end.
+        each = crosses[np.any(crosses, axis=1)]
+        above = min(above, int(np.min(each.shape[1] - 1 - np.argmax(each[:, ::-1], axis=1))))
+        uncovered = uncovered or (max(last, top), top)
+    return _Gap(below, above, top, last, uncovered)
+
+
+def _amplifies(closed: complex) -> bool:
+    """Whether the loop has more than 0 dB where its closed loop has this value."""
+    return bool(abs(closed) > abs(1.0 - closed))
 
 
 def _in_db(size: Interval) -> Interval:
@@ -330,40 +376,45 @@ def _beyond(
     frequency_hz: FloatArray,
     possible: ComplexArray,
     nominal: ComplexArray,
-    from_hz: float,
+    gap: _Gap,
     per_octave: float = 0.0,
     shown_gain_db: float | None = None,
 ) -> BandVerdict | None:
-    """Margins above the measured band: of the nominal loop, and the worst of the possible loops.
+    """Margins outside the measured band: of the nominal loop, and the worst of the possible loops.
 
-    The uncertainty of a gain margin grows by ``per_octave`` (logarithm); a gain margin shown by a
-    raised gain is certain.
+    The uncertainty of a gain margin grows by ``per_octave`` (logarithm) above the band; a gain
+    margin shown by a raised gain is certain.
     """
-    use: BoolArray = frequency_hz >= from_hz
-    if np.count_nonzero(use) < 2:
+    octaves = np.zeros(frequency_hz.size)
+    if gap.top_hz > 0.0:
+        octaves = np.maximum(np.log2(frequency_hz / gap.top_hz), 0.0)
+    larger = possible * np.exp(per_octave * octaves)
+    open_ = [part for part in (slice(0, gap.below), slice(gap.above, None)) if _long(part, octaves)]
+    if not open_:
         return None
-    f = frequency_hz[use]
-    worst, mean = worst_of(possible[:, use]), worst_of(nominal[:, use])
-    octaves = np.log2(f / from_hz) if from_hz > 0.0 else np.zeros(f.size)
-    larger = np.exp(per_octave * octaves)
-    least_db = max(worst_of(possible[:, use] * larger).gain_margin_db, shown_gain_db or 0.0)
-    least_db = min(worst.gain_margin_db, least_db)
-    peak = sensitivity_peak(nominal[:, use])
-    over = np.abs(possible[:, use]) > 1.0
-    crosses = bool(np.any(over[:, 1:] != over[:, :-1]))
-    phase = (
-        Interval(mean.phase_margin_deg, worst.phase_margin_deg, mean.phase_margin_deg)
-        if crosses
-        else None
-    )
-    gain = Interval(mean.gain_margin_db, least_db, mean.gain_margin_db)
+    worst = [worst_of(possible[:, part]) for part in open_]
+    mean = [worst_of(nominal[:, part]) for part in open_]
+    least_db = min(worst_of(larger[:, part]).gain_margin_db for part in open_)
+    least_db = max(least_db, shown_gain_db or 0.0)
+    least_db = min(least_db, *(each.gain_margin_db for each in worst))
+    peak = max(sensitivity_peak(nominal[:, part]) for part in open_)
+    over = np.abs(possible) > 1.0
+    crosses = any(bool(np.any(over[:, part][:, 1:] != over[:, part][:, :-1])) for part in open_)
+    usual_deg = min(each.phase_margin_deg for each in mean)
+    least_deg = min(each.phase_margin_deg for each in worst)
+    usual_db = min(each.gain_margin_db for each in mean)
     return BandVerdict(
-        float(f[0]),
-        float(f[-1]),
-        phase,
-        gain if least_db < threshold.MOST_DB else None,
-        Interval(peak, peak, max(worst.ms, peak)),
+        float(frequency_hz[0 if gap.below else gap.above]),
+        float(frequency_hz[-1]),
+        Interval(usual_deg, least_deg, usual_deg) if crosses else None,
+        Interval(usual_db, least_db, usual_db) if least_db < threshold.MOST_DB else None,
+        Interval(peak, peak, max(peak, *(each.ms for each in worst))),
     )
+
+
+def _long(part: slice, grid: FloatArray) -> bool:
+    """Whether a part of the grid has a segment."""
+    return grid[part].size >= 2
 
 
 def _worst(measured: BandVerdict | None, beyond: BandVerdict | None) -> tuple[Goals, Goals]:

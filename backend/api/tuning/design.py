@@ -188,7 +188,7 @@ async def write_gains(bench: TheBench, connected: Controlled, request: GainWrite
     if request.gains is not None:
         g = request.gains
         wanted = _gains(g.speed_bandwidth_hz, g.integral_hz, g.position_1_s, g.inertia_kgm2)
-        raw = gains.plan_gains(
+        raw = gains.plan_design(
             connected.drive, wanted, g.inertia_kgm2, await gains.rotor_inertia(connected.axis)
         )
     else:

@@ -18,7 +18,7 @@ from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.tools.thresholds import autotune_apply as threshold
 from backend.work.jobs import Progress
-from drivers.errors import DriveError
+from drivers.errors import DriveError, OutOfRange
 from drivers.texts.message import Text, joined, text
 
 #: Makes a candidate with this share of the gain; None where it does not meet the margins.
@@ -65,7 +65,12 @@ async def first_kept(
                 break
         candidate = waiting.pop(0)
         progress(0.65, text("autotune.applying", step=5, steps=6))
-        raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
+        try:
+            raw = await plan(axis, candidate, check.inertia_kgm2, check.motor_inertia_kgm2)
+        except OutOfRange as error:
+            # With more gain than designed it would be another design.
+            tried.append(of_candidate(candidate, error.text))
+            continue
         earlier = {key: await axis.drive.raw(key) for key in raw}
         # On the restore list: if this server is killed now, the next one undoes the unverified
         # values.

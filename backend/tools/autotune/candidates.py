@@ -179,9 +179,13 @@ def cautious_plant(
 async def plan(
     axis: Axis, candidate: Candidate, inertia_kgm2: float, motor_inertia_kgm2: float | None = None
 ) -> dict[str, int]:
-    """Raw values that realise a candidate: gains, inertia, filters and notches."""
+    """Raw values that realise a candidate: gains, inertia, filters and notches.
+
+    Raises:
+        OutOfRange: the drive cannot hold as little gain as designed.
+    """
     rotor = await gain_tool.rotor_inertia(axis, motor_inertia_kgm2)
-    raw = gain_tool.plan_gains(axis.drive, candidate.gains, inertia_kgm2, rotor)
+    raw = gain_tool.plan_design(axis.drive, candidate.gains, inertia_kgm2, rotor)
     raw |= gain_tool.plan_filters(axis.drive, candidate.filters)
     if axis.drive.profile.notch is not None:
         raw |= await notch_tool.plan_notches(axis.drive, candidate.notches, meaning_of(axis.drive))

@@ -8,6 +8,7 @@ are shown raw; no design is made for them.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from backend.axis.axis import Axis
 from backend.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from backend.tools.thresholds import autotune_gains as threshold
-from drivers.errors import NotAllowed
+from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 from profiles.schema import GainSpec, StiffnessTable
 
@@ -156,6 +157,69 @@ def plan_gains(
     return {key: _within(drive, key, value) for key, value in raw.items()}
 
 
+def plan_design(
+    drive: Drive, gains: Gains, inertia_kgm2: float, rotor_kgm2: float | None = None
+) -> dict[str, int]:
+    """Raw values of a design as `plan_gains`; rounded towards less gain where the nearest is more.
+
+    A drive multiplies its speed gain by the inertia that it holds, which is rounded as well.
+
+    Raises:
+        NotAllowed: as `plan_gains`.
+        OutOfRange: a parameter cannot hold as little gain as designed.
+    """
+    spec, raw = spec_of(drive), plan_gains(drive, gains, inertia_kgm2, rotor_kgm2)
+    heavier = _held_inertia(drive, spec, raw, rotor_kgm2, inertia_kgm2) / inertia_kgm2
+    position = gains.position_1_s / (TURN if spec.convention == "bandwidth" else 1.0)
+    time = spec.convention == "gain"
+    integral = 1.0 / (TURN * gains.integral_hz) if time else gains.integral_hz
+    for key, value, by_time in (
+        (spec.speed, gains.speed_bandwidth_hz / heavier if heavier else np.inf, False),
+        (spec.integral, integral, time),
+        (spec.position, position, False),
+    ):
+        if key is None:
+            continue
+        more = _more(drive, key, raw[key], value, by_time)
+        if more <= threshold.MORE:
+            continue
+        nearest = math.ceil(raw[key] * more) if by_time else math.floor(raw[key] / more)
+        raw[key] = _within(drive, key, nearest)
+        more = _more(drive, key, raw[key], value, by_time)
+        if more > threshold.MORE:
+            raise OutOfRange(
+                "autotune.gain-below-least",
+                drive=drive.name,
+                parameter=key,
+                gain=drive.parameter(key).name,
+                more=more,
+            )
+    return raw
+
+
+def _more(drive: Drive, key: str, raw: int, value: float, by_time: bool) -> float:
+    """Gain of a raw value over that of a value in SI units; ``by_time``: a time, which divides."""
+    held = si_value(drive.parameter(key), _engineering(drive, key, raw)) or 0.0
+    if by_time:
+        # No time at all has no gain to compare with: families read it as no integral part.
+        return value / held if held else 0.0
+    return held / value
+
+
+def _held_inertia(
+    drive: Drive, spec: GainSpec, raw: dict[str, int], rotor_kgm2: float | None, otherwise: float
+) -> float:
+    """Inertia of the axis that the drive holds with these raw values; ``otherwise`` if none."""
+    if spec.inertia is None or spec.inertia not in raw:
+        return otherwise
+    value = _engineering(drive, spec.inertia, raw[spec.inertia])
+    if spec.inertia_meaning in ("ratio", "ratio_percent"):
+        percent = 100.0 if spec.inertia_meaning == "ratio_percent" else 1.0
+        return (rotor_kgm2 or 0.0) * (1.0 + value / percent)
+    held = si_value(drive.parameter(spec.inertia), value) or 0.0
+    return held + (rotor_kgm2 or 0.0) if spec.inertia_meaning == "load" else held
+
+
 def raised(drive: Drive, key: str, raw: int, factor: float) -> int:
     """Raw value of a gain multiplied by a factor, limited to the parameter's range."""
     parameter = drive.parameter(key)
@@ -232,7 +296,7 @@ async def rotor_inertia(axis: Axis, given_kgm2: float | None = None) -> float | 
 
 
 def _within(drive: Drive, key: str, raw: int) -> int:
-    """Limit a raw value to the parameter's range: a lower gain than designed is always allowed."""
+    """Limit a raw value to the parameter's range."""
     low, high = drive.parameter(key).raw_limits
     raw = raw if high is None else min(raw, int(high))
     return raw if low is None else max(raw, int(low))

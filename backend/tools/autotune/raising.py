@@ -60,18 +60,21 @@ def raised_to(
 def not_shown(
     verdict: LoopVerdict | None, guaranteed: Goals, shown: GainSteps, missed: tuple[Missed, ...]
 ) -> list[Text]:
-    """What remains unverified above the measured band after raising the gain; empty if nothing."""
+    """What raising the gain leaves unverified outside the measured band; empty if nothing."""
     if verdict is None:
         return []
     said = in_words(misses(verdict, guaranteed))
     wanted = wanted_db(missed, guaranteed)
     if shown.shown_db < wanted - MARGIN_DB:
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        crossover_hz, end_hz = verdict.uncovered or (verdict.last_crossover_hz, 0.0)
+        code = "autotune.crossover-not-shown"
+        if crossover_hz < end_hz:
+            code = "autotune.crossover-below-not-shown"
         said.append(
             text(
-                "autotune.crossover-not-shown",
-                crossover_hz=verdict.last_crossover_hz,
-                measured_hz=top,
+                code,
+                crossover_hz=crossover_hz,
+                measured_hz=end_hz,
                 shown_db=shown.shown_db,
                 wanted_db=wanted,
             )

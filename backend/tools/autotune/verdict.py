@@ -13,7 +13,7 @@ from backend.analysis.loop.notch import Notch
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.reference_path import reference_paths
 from backend.analysis.response.sampling import Hold
-from backend.analysis.signals.arrays import ComplexArray, FloatArray
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axis.axis import Axis
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import AxisFacts
@@ -62,6 +62,17 @@ def fixed_of(
     return fixed
 
 
+def sharp(frf: Frf) -> BoolArray:
+    """Which lines have a small standard deviation [n]; an unknown one, of a single period, is none.
+
+    Lines without any scatter are of a single period as well.
+    """
+    known = np.isfinite(frf.std_db) & np.isfinite(frf.std_deg)
+    known &= np.hypot(frf.std_db, frf.std_deg) > 0.0
+    coherent = frf.in_band & (frf.coherence > COHERENT)
+    return np.asarray(known & coherent & (frf.std_deg <= BLURRED_DEG))
+
+
 def sharp_lines(frf: Frf) -> Lines | None:
     """Lines from which margins can be read; None where they begin above the loop's bandwidth."""
     found = reported_lines(frf)
@@ -74,12 +85,12 @@ def reported_lines(frf: Frf) -> Lines | None:
     In a slow loop they lie above its crossover: they show its gain and delay, but not the margins
     of that crossover.
     """
-    use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
+    use = sharp(frf)
     f, closed = frf.frequency_hz[use], frf.response[use]
     if f.size < LINES:
         return None
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
-    deviation = np.sqrt(0.5 * sum(np.nan_to_num(part, nan=0.0) ** 2 for part in parts))
+    deviation = np.sqrt(0.5 * sum(part**2 for part in parts))
     gaps = np.flatnonzero(f[1:] > threshold.GAP * f[:-1])
     # Below 20 Hz the lines of a linear grid are far apart anyway.
     end = next((int(i) + 1 for i in gaps if f[i] > 20.0), f.size)
@@ -126,7 +137,6 @@ def verdict_of(
         return judge(
             None, dense, every, nominal, shown_gain_db=shown_gain_db, alternatives=alternatives
         )
-    crossing = sharp_lines(frf) is not None
     f = seen.frequency_hz
     expected = loops(f, plant.on(f).response())
     paths = reference_paths(
@@ -139,7 +149,7 @@ def verdict_of(
     )
     found = [
         judge(
-            Lines(f, path.closed, seen.deviation) if crossing else None,
+            Lines(f, path.closed, seen.deviation),
             dense,
             every,
             nominal,
@@ -162,13 +172,13 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
         elif each.what == "stability":
             said.append(text("autotune.not-stable"))
         elif each.what == "coverage":
-            said.append(
-                text(
-                    "autotune.crossover-above-measured",
-                    crossover_hz=each.value,
-                    measured_hz=each.limit,
-                )
+            below = each.value < each.limit
+            code = (
+                "autotune.crossover-below-measured"
+                if below
+                else "autotune.crossover-above-measured"
             )
+            said.append(text(code, crossover_hz=each.value, measured_hz=each.limit))
         else:
             code, unit = _MARGINS.get((each.what, each.end)) or _STATED[each.what]
             said.append(Text(code, {f"have{unit}": each.value, f"wanted{unit}": each.limit}))

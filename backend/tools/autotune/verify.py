@@ -23,7 +23,6 @@ from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
 from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
-    BLURRED_DEG,
     COHERENT,
     LINES,
     MARGIN_DB,
@@ -32,6 +31,7 @@ from backend.tools.autotune.verdict import (
     WITHIN,
     in_words,
     misses,
+    sharp,
     sharp_lines,
     verdict_of,
 )
@@ -150,7 +150,7 @@ async def verify(
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(guaranteed, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
-    blurred = blurred or (verdict is not None and verdict.measured is None)
+    blurred = blurred or (verdict is not None and sharp_lines(swept.frf) is None)
     as_predicted = _as_predicted(candidate.bandwidth_hz, _width_of(read), threshold.DOUBTED)
     every: Frf | None = None
     if (not read or blurred or not as_predicted) and pairs > 1 and not missed:
@@ -218,7 +218,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     lines above the bandwidth are left, the crossover is not among them.
     """
     frf = swept.frf
-    use = frf.in_band & (frf.coherence > COHERENT) & ~(frf.std_deg > BLURRED_DEG)
+    use = sharp(frf)
     if np.count_nonzero(use) < LINES:
         return {}
     f, closed = frf.frequency_hz[use], frf.response[use]
@@ -245,6 +245,8 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
 def restless(step: step_evaluation.StepResult) -> Text | None:
     """Message that a loop with too few usable lines has no well-damped step either; else None."""
     found = step.step
+    if found is not None and "overshoot_percent" in step_evaluation.unknown_figures(found):
+        return text("autotune.few-lines-lost")
     if found is not None and found.overshoot_percent <= threshold.OVERSHOOT_PERCENT:
         return None
     return text("autotune.few-lines")
@@ -311,22 +313,21 @@ def otherwise(verified: Verified) -> Text | None:
 
 
 def unseen(last_hz: float | None, verified: Verified) -> Text | None:
-    """Note that the highest possible crossover lies above the verified band; None otherwise.
+    """Note that a possible crossover lies outside the verified band; None otherwise.
 
     Above its resonances, the motor of a compliant axis is decoupled and lighter: its loop may cross
     0 dB for the last time at a frequency that the samples of this exchange do not show.
     """
     verdict = verified.verdict
     if verdict is not None:
-        if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
+        gain_db = verdict.shown_gain_db
+        if verdict.coverage != "gain_steps" or gain_db is None or verdict.uncovered is None:
             return None
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        return text(
-            "autotune.margins-bounded",
-            crossover_hz=verdict.last_crossover_hz,
-            measured_hz=top,
-            gain_db=verdict.shown_gain_db,
-        )
+        crossover_hz, end_hz = verdict.uncovered
+        code = "autotune.margins-bounded"
+        if crossover_hz < end_hz:
+            code = "autotune.margins-below-bounded"
+        return text(code, crossover_hz=crossover_hz, measured_hz=end_hz, gain_db=gain_db)
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
     if not verified.sweep.margins or last_hz is None or last_hz <= np.max(lines, initial=0.0):

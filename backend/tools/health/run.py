@@ -12,7 +12,7 @@ from backend.tools.health.texts import TEXTS, report
 from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.inertia.run import TOOL as INERTIA
 from backend.tools.inertia.settings import InertiaRequest
-from backend.tools.step.evaluate import StepSettings
+from backend.tools.step.evaluate import StepSettings, unknown_figures
 from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
@@ -117,8 +117,9 @@ async def _step(
         settings.envelope, size=settings.step_rpm, rated_torque_nm=settings.rated_torque_nm
     )
     found = (await step_response(run.axis, run.session, asked, progress, run.keep)).step
-    rise = None if found is None or found.rise_s is None else found.rise_s
-    over = None if found is None else found.overshoot_percent
+    unknown = () if found is None else unknown_figures(found)
+    rise = None if found is None or "rise_s" in unknown else found.rise_s
+    over = None if found is None or "overshoot_percent" in unknown else found.overshoot_percent
     return {
         "step_rise": None if rise is None else HealthValue(quantity="step_rise", value=rise),
         "step_overshoot": None

@@ -183,12 +183,35 @@ async def probe_axis(
 
 
 def _judged(name: str, recording: Recording, rated_nm: float) -> Probed:
+    """Rough values from the last pulses.
+
+    A heavy load on a soft coupling swings against the motor, so that the fit of a rigid body has
+    little inertia, or less than none. The momentum that the motor took is then all that is known.
+
+    Raises:
+        NotAllowed: the motion gave energy to the motor, or a rigid body moved against the torque.
+    """
     fit = rough_fit(
         recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
     )
-    if fit.inertia_kgm2 <= 0:
+    taken = _momentum(recording) / float(np.max(np.abs(recording.velocity_rad_s)))
+    require_right_sign(name, recording)
+    if fit.inertia_kgm2 < -threshold.AGAINST * taken and _energy(recording) < threshold.GAINED:
         raise _wrong_sign(name)
-    return Probed(fit.inertia_kgm2, max(fit.coulomb_nm, 0.0), fit.gravity_nm, rated_nm)
+    inertia = fit.inertia_kgm2 if fit.inertia_kgm2 >= threshold.RIGID * taken else taken
+    return Probed(inertia, max(fit.coulomb_nm, 0.0), fit.gravity_nm, rated_nm)
+
+
+def _momentum(recording: Recording) -> float:
+    """Half of the range of the torque's integral [Nms]: what the first pulse gave."""
+    given = np.cumsum(np.where(recording.valid, recording.torque_nm, 0.0))
+    return float(np.ptp(np.concatenate([[0.0], given]))) / recording.sample_rate_hz / 2.0
+
+
+def _energy(recording: Recording) -> float:
+    """Energy that the motor gave, as a share of what went to and fro; below 0 it took some."""
+    power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
+    return float(np.sum(power)) / max(float(np.sum(np.abs(power))), 1e-12)
 
 
 def require_right_sign(name: str, recording: Recording) -> None:
@@ -197,8 +220,7 @@ def require_right_sign(name: str, recording: Recording) -> None:
     Raises:
         NotAllowed: torque times speed shows a gain: one of them has the wrong sign.
     """
-    power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
-    if float(np.sum(power)) < -threshold.GAINED * float(np.sum(np.abs(power))):
+    if _energy(recording) < -threshold.GAINED:
         raise _wrong_sign(name)
 
 

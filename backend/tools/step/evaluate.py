@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import math
+from dataclasses import asdict, dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -38,7 +39,10 @@ class StepSettings:
 
 @dataclass(frozen=True)
 class StepResult:
-    """Curves [n] in rpm or rev and % of rated torque, and the figures read from them."""
+    """Curves [n] in rpm or rev and % of rated torque, and the figures read from them.
+
+    A figure is NaN where it depends on samples that were not received.
+    """
 
     kind: Literal["speed", "move"]
     time_s: npt.NDArray[np.float64]
@@ -82,6 +86,9 @@ def evaluate(
         step = step_metrics(
             time[begin:end], actual[begin:end], target=settings.size, initial=0.0, window=window
         )
+        step = _known_step(
+            step, actual[begin:end], settings.size, window, recording.valid[begin:end], rate
+        )
     else:
         actual = (recording.position_rad - recording.position_rad[0]) / _TURN
         noise = _noise(actual[-round(0.5 * settings.hold_s * rate) :])
@@ -89,11 +96,71 @@ def evaluate(
             usual = 0.02 * abs(settings.size)
             window, widened = max(usual, threshold.NOISES * noise), threshold.NOISES * noise > usual
         move = move_metrics(time, demand, actual, window=window, torque=torque)
+        valid = recording.valid[: time.size]
+        move = _known_move(move, actual - demand[-1], window, valid, rate)
     return StepResult(
         settings.kind, time, demand, actual, torque, step, move,
         float(np.max(np.abs(torque))), float(np.sqrt(np.mean(torque**2))),
         noise, window, widened, recording.valid[: time.size],
     )  # fmt: skip
+
+
+def _gaps(valid: npt.NDArray[np.bool_], rate: float) -> npt.NDArray[np.bool_]:
+    """Samples [n] in gaps longer than `threshold.GAP_S`."""
+    edges = np.diff(np.concatenate([[False], ~valid, [False]]).astype(np.int8))
+    long = np.zeros(valid.size, np.bool_)
+    for first, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        long[first:end] = end - first > threshold.GAP_S * rate
+    return long
+
+
+def _settled_unseen(
+    deviation: npt.NDArray[np.float64], window: float, valid: npt.NDArray[np.bool_], rate: float
+) -> bool:
+    """Whether a gap may hide when the signal [n] entered the window for the last time."""
+    outside = np.flatnonzero(valid & (np.abs(deviation) > window))
+    after = int(outside[-1]) + 1 if outside.size else 0
+    return bool(np.any(_gaps(valid, rate)[after:]))
+
+
+def _known_step(
+    found: StepMetrics,
+    actual: npt.NDArray[np.float64],
+    size: float,
+    window: float,
+    valid: npt.NDArray[np.bool_],
+    rate: float,
+) -> StepMetrics:
+    """The figures of a step, NaN where they depend on samples that were not received."""
+    if np.all(valid):
+        return found
+    nan, gaps = float("nan"), bool(np.any(_gaps(valid, rate)))
+    if found.rise_s is not None:
+        progress = actual / size
+        low, high = (int(np.argmax(progress >= level)) for level in (0.1, 0.9))
+        if not np.all(valid[max(low - 1, 0) : high + 1]):
+            found = replace(found, rise_s=nan)
+    elif gaps:
+        found = replace(found, rise_s=nan)
+    if _settled_unseen(actual - size, window, valid, rate):
+        found = replace(found, settling_s=nan)
+    return replace(found, overshoot_percent=nan, peak_time_s=nan) if gaps else found
+
+
+def _known_move(
+    found: MoveMetrics,
+    deviation: npt.NDArray[np.float64],
+    window: float,
+    valid: npt.NDArray[np.bool_],
+    rate: float,
+) -> MoveMetrics:
+    """The figures of a move, NaN where they depend on samples that were not received.
+
+    Following error and torque are then those of the samples that were.
+    """
+    if _settled_unseen(deviation, window, valid, rate):
+        found = replace(found, settling_s=float("nan"))
+    return replace(found, overshoot=float("nan")) if np.any(_gaps(valid, rate)) else found
 
 
 def _noise(part: npt.NDArray[np.float64]) -> float:
@@ -102,6 +169,15 @@ def _noise(part: npt.NDArray[np.float64]) -> float:
         return 0.0
     x = np.linspace(-1.0, 1.0, part.size)
     return float(np.std(part - np.polynomial.Legendre.fit(x, part, 2)(x)))
+
+
+def unknown_figures(found: StepMetrics | MoveMetrics) -> tuple[str, ...]:
+    """Names of the figures that depend on samples that were not received."""
+    return tuple(
+        name
+        for name, value in asdict(found).items()
+        if isinstance(value, float) and math.isnan(value)
+    )
 
 
 def significant_size(result: StepResult) -> float:
@@ -145,6 +221,8 @@ def reevaluate(arrays: Arrays, meta: Meta) -> StepAnswer:
 
 def answer_of(result: StepResult) -> StepAnswer:
     """The result in the form that page, report, files and command line use."""
+    numbers = result.step or result.move
+    unknown = () if numbers is None else unknown_figures(numbers)
     return StepAnswer(
         kind=result.kind,
         unit="rpm" if result.kind == "speed" else "rev",
@@ -159,4 +237,6 @@ def answer_of(result: StepResult) -> StepAnswer:
         widened=result.widened,
         torque_peak_percent=result.torque_peak_percent,
         torque_rms_percent=result.torque_rms_percent,
+        unknown=unknown,
+        lost_percent=0.0 if result.valid is None else 100.0 * float(np.mean(~result.valid)),
     )

@@ -14,22 +14,29 @@ class _Numbers(BaseModel):
 
 
 class StepNumbers(_Numbers):
-    """Figures of a speed step; times from the command, None where never reached."""
+    """Figures of a speed step; times from the command, None where never reached.
+
+    None also where a figure depends on samples that were not received; ``unknown`` of the answer
+    then names it.
+    """
 
     initial: float
     final: float
-    overshoot_percent: float
+    overshoot_percent: float | None
     rise_s: float | None
     settling_s: float | None
-    peak_time_s: float
+    peak_time_s: float | None
 
 
 class MoveNumbers(_Numbers):
-    """Figures of a move; ``settling_s`` counts from the end of the commanded motion."""
+    """Figures of a move; ``settling_s`` counts from the end of the commanded motion.
+
+    None as in `StepNumbers`.
+    """
 
     following_peak: float
     following_rms: float
-    overshoot: float
+    overshoot: float | None
     settling_s: float | None
     torque_peak: float | None = Field(description="in % of rated torque")
     torque_rms: float | None = Field(description="in % of rated torque")
@@ -54,3 +61,9 @@ class StepAnswer(ToolResult):
     widened: bool = Field(description="whether noise asked for a wider window than usual")
     torque_peak_percent: float
     torque_rms_percent: float
+    lost_percent: float = Field(
+        default=0.0, description="share of the samples that were not received"
+    )
+    unknown: tuple[str, ...] = Field(
+        default=(), description="figures that depend on samples that were not received"
+    )

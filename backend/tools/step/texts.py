@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from backend.tools.step.result import StepAnswer
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
@@ -19,6 +21,15 @@ TEXTS: dict[str, tuple[str, str]] = {
     "field.window": ("Settling window", "稳定窗口"),
     "settled": ("settled within {window} {unit}", "已稳定在 {window} {unit} 以内"),
     "not_settled": ("not settled within {window} {unit}", "未稳定到 {window} {unit} 以内"),
+    "settling_unknown": (
+        "not known whether it settled within {window} {unit}",
+        "无法判断是否已稳定在 {window} {unit} 以内",
+    ),
+    "samples_lost": (
+        "{value} % of the samples were not received: figures that depend on them are left out, "
+        "the others are of those that were.",
+        "有 {value} % 的采样未收到：依赖这些采样的指标未给出，其余指标仅来自已收到的采样。",
+    ),
     "widened": (
         "Noise is more than a tenth of the usual settling window: a wider one was taken.",
         "噪声超过常用稳定窗口的十分之一：已采用更宽的窗口。",
@@ -44,13 +55,12 @@ def report(result: StepAnswer) -> Section:
     numbers = result.step or result.move
     settled = numbers is not None and numbers.settling_s is not None
     window = "–" if result.window is None else f"{result.window:.3g}"
-    notes = [
-        Note(
-            "settled" if settled else "not_settled",
-            "plain" if settled else "warn",
-            {"window": window, "unit": result.unit},
-        )
-    ]
+    unknown = "settling_s" in result.unknown
+    verdict = "settled" if settled else "settling_unknown" if unknown else "not_settled"
+    tone: Literal["plain", "warn"] = "plain" if settled else "warn"
+    notes = [Note(verdict, tone, {"window": window, "unit": result.unit})]
+    if result.lost_percent > 0.0:
+        notes.append(Note("samples_lost", "warn", {"value": f"{result.lost_percent:.2g}"}))
     if result.widened:
         notes.append(Note("widened"))
     rows: list[Row] = []

@@ -103,6 +103,64 @@ def test_a_crossover_above_the_band_keeps_no_design() -> None:
     assert [m.what for m in found.missed(PROMISED, 1.0, 1.0, 1.03)] == ["coverage"]
 
 
+def test_a_crossover_below_the_band_is_not_measured() -> None:
+    """4 Hz with 20 ms: 61° that no line from 5 Hz on shows, and 9.9 dB that they do."""
+    found = verdict_of(4.0, 20e-3, 246.0)
+    assert found.coverage == "predicted"
+    assert found.measured is not None
+    assert found.measured.phase_margin_deg is None
+    assert found.uncovered == pytest.approx((4.0, 5.0), rel=0.1)
+    assert [m.what for m in found.missed(Goals(9.0, 48.0, 1.8), 1.0, 1.0, 1.03)] == ["coverage"]
+    true_deg = 90 - 360 * 4.0 * 20e-3
+    assert found.stated.phase_margin_deg == pytest.approx(true_deg, abs=1.0)
+    assert found.worst.phase_margin_deg < true_deg
+    assert found.stated.gain_margin_db == pytest.approx(20 * np.log10(12.5 / 4.0), abs=0.3)
+    # What the lines show still counts: of 30 ms here, 20 ms were predicted.
+    late = verdict_of(4.0, 30e-3, 246.0, predicted_s=20e-3)
+    assert late.stated.gain_margin_db == pytest.approx(20 * np.log10(25.0 / 12.0), abs=0.4)
+    assert verdict_of(4.0, 20e-3, 246.0, shown_db=6.0).coverage == "gain_steps"
+    # One that crosses just above the first line is measured, whatever its uncertainty.
+    just = verdict_of(5.2, 20e-3, 246.0)
+    assert just.coverage == "measured"
+    assert just.measured is not None
+
+
+def test_a_crossover_between_the_last_line_and_the_grid_is_not_lost() -> None:
+    """100 Hz with 1 ms: 54°. The last line lies in the segment of the dense grid that crosses."""
+    before = float(DENSE[np.searchsorted(DENSE, 100.0) - 1])
+    found = verdict_of(100.0, 1e-3, 0.5 * (before + 100.0))
+    assert found.stated.phase_margin_deg == pytest.approx(54.0, abs=1.0)
+    assert found.worst.phase_margin_deg < 54.0
+
+
+def test_a_crossover_that_was_predicted_below_the_end_of_the_band_is_not_lost() -> None:
+    """The loop has 6 % more gain than predicted: it crosses at 106 Hz, above the lines."""
+    f = np.linspace(5.0, 104.0, 100)
+    loop = loop_of(f, 106.0, 1e-3)
+    lines = Lines(f, loop / (1 + loop), np.full(f.size, 0.01))
+    nominal = loop_of(DENSE, 100.0, 1e-3)
+    found = judge(lines, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.001))
+    assert found.coverage == "predicted"
+    assert found.uncovered == pytest.approx((105.0, 104.0), rel=0.02)
+    assert found.stated.phase_margin_deg == pytest.approx(54.0, abs=2.0)
+    assert found.worst.phase_margin_deg < 52.0
+
+
+def test_lines_that_begin_above_the_crossover_still_count_where_they_are() -> None:
+    """A resonance at 150 Hz that the design does not know is measured, 4 Hz of crossover is not."""
+    f = np.linspace(5.0, 246.0, 242)
+    s, w = 2j * np.pi * f, 2 * np.pi * 150.0
+    loop = loop_of(f, 4.0, 5e-3) * (1.0 + 0.6 * w * s / (s**2 + 0.02 * w * s + w**2))
+    lines = Lines(f, loop / (1 + loop), np.full(f.size, 0.01))
+    nominal = loop_of(DENSE, 4.0, 5e-3)
+    found = judge(lines, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.01))
+    assert found.coverage == "predicted"
+    assert found.predicted is not None
+    assert found.predicted.phase_margin_deg is not None
+    assert found.predicted.phase_margin_deg.value == pytest.approx(90 - 7.2, abs=1.0)
+    assert found.stated.ms == pytest.approx(float(np.max(np.abs(1 / (1 + loop)))), rel=0.01)
+
+
 def test_a_raised_gain_covers_it() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0, shown_db=6.5)
     assert found.coverage == "gain_steps"

@@ -33,7 +33,7 @@ def test_a_time_that_ends_in_too_few_blocks_is_refused(
         require_long_enough(settings, RATE)
     assert caught.value.code == "dwell.too-short"
     assert caught.value.text.params["least_s"] == least_s
-    assert f"{least_s:g} s" in caught.value.advice
+    assert f"{least_s:g} s" in str(caught.value.advice)
     # And the time that is named is enough, to the end.
     longer = asked(frequency_hz, least_s, turn_rpm)
     wanted = require_long_enough(longer, RATE)

@@ -17,6 +17,7 @@ from backend.analysis.loop.margins import Margins
 from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.work.jobs import Progress
+from drivers.errors import OutOfRange
 from drivers.texts.message import Text, text
 
 GOALS = Goals(9.0, 48.0, 1.8)
@@ -98,3 +99,27 @@ async def test_where_less_gain_keeps_no_margins_the_next_design_is_tried(
 ) -> None:
     seen, kept = await kept_of(monkeypatch, [design(10.0), design(2.0)], soft=False)
     assert (seen, kept) == ([10.0, 2.0], 2.0)
+
+
+async def test_a_design_that_the_drive_holds_with_more_gain_only_is_left_out_and_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def plan(_axis: Any, candidate: Candidate, *_: Any) -> dict[str, int]:
+        raise OutOfRange("autotune.gain-below-least", drive="X", parameter="P", gain="G", more=2.0)
+
+    async def never(*_: Any) -> Any:
+        raise AssertionError("written or verified")
+
+    monkeypatch.setattr(tune_apply, "plan", plan)
+    monkeypatch.setattr(tune_apply, "write_settings", never)
+    monkeypatch.setattr(tune_apply, "verify", never)
+    tried: list[Text] = []
+    nothing: Any = None
+    check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
+    rows = [design(6.0), design(3.0)]
+    found = await tune_apply.first_kept(
+        nothing, nothing, check, rows, GOALS, tried, Progress(lambda: None), None
+    )
+    assert found is None
+    assert [each.code for each in tried] == ["autotune.candidate"] * len(rows)
+    assert "2 times the designed gain" in tried[0].words()

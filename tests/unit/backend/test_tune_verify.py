@@ -110,6 +110,28 @@ def test_a_loop_that_is_seen_above_its_crossover_only_tells_no_margins(from_hz: 
     assert sharp_margins(replace(swept, frf=replace(swept.frf, std_deg=blurred))) == {}
 
 
+@pytest.mark.parametrize("unknown", [float("nan"), 0.0])
+def test_lines_whose_deviation_is_unknown_are_not_sharp(unknown: float) -> None:
+    """A single period permits no estimate of its lines' deviation, and looks fully coherent."""
+    swept = loop_swept(1.0)
+    frf = swept.frf
+    nothing = np.full(frf.frequency_hz.size, unknown)
+    once = replace(frf, std_db=nothing, std_deg=nothing, coherence=np.ones(nothing.size))
+    assert sharp_margins(replace(swept, frf=once)) == {}
+    assert reported_lines(once) is None
+    # Single lines without one count no more than blurred ones.
+    part = np.arange(nothing.size) % 2 == 0
+    some = replace(
+        frf,
+        std_db=np.where(part, unknown, frf.std_db),
+        std_deg=np.where(part, unknown, frf.std_deg),
+    )
+    reported = reported_lines(some)
+    assert reported is not None
+    assert reported.frequency_hz.tolist() == frf.frequency_hz[~part].tolist()
+    assert np.all(reported.deviation > 0.0)
+
+
 def test_lines_above_the_crossover_tell_the_loop_but_not_its_margins() -> None:
     """Of a loop whose bandwidth is 60 Hz, seen from 80 Hz on."""
     frf = loop_swept(1.0).frf

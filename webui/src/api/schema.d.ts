@@ -9435,6 +9435,8 @@ export interface components {
         /**
          * MoveNumbers
          * @description Figures of a move; ``settling_s`` counts from the end of the commanded motion.
+         *
+         *     None as in `StepNumbers`.
          */
         MoveNumbers: {
             /** Following Peak */
@@ -9442,7 +9444,7 @@ export interface components {
             /** Following Rms */
             following_rms: number;
             /** Overshoot */
-            overshoot: number;
+            overshoot: number | null;
             /** Settling S */
             settling_s: number | null;
             /**
@@ -12601,6 +12603,12 @@ export interface components {
              */
             kind: "speed" | "move";
             /**
+             * Lost Percent
+             * @description share of the samples that were not received
+             * @default 0
+             */
+            lost_percent: number;
+            /**
              * Measurements
              * @description names of the stored raw data
              * @default []
@@ -12636,6 +12644,12 @@ export interface components {
              */
             unit: "rpm" | "rev";
             /**
+             * Unknown
+             * @description figures that depend on samples that were not received
+             * @default []
+             */
+            unknown: string[];
+            /**
              * Widened
              * @description whether noise asked for a wider window than usual
              */
@@ -12649,6 +12663,9 @@ export interface components {
         /**
          * StepNumbers
          * @description Figures of a speed step; times from the command, None where never reached.
+         *
+         *     None also where a figure depends on samples that were not received; ``unknown`` of the answer
+         *     then names it.
          */
         StepNumbers: {
             /** Final */
@@ -12656,9 +12673,9 @@ export interface components {
             /** Initial */
             initial: number;
             /** Overshoot Percent */
-            overshoot_percent: number;
+            overshoot_percent: number | null;
             /** Peak Time S */
-            peak_time_s: number;
+            peak_time_s: number | null;
             /** Rise S */
             rise_s: number | null;
             /** Settling S */

@@ -635,6 +635,10 @@ export const tuning = {
   'step.before': ['before', '之前'],
   'step.now': ['now', '现在'],
   'step.windowWidened': ['Settling window, ten times the noise', '调节窗口（噪声的十倍）'],
+  'step.samplesLost': [
+    '{percent} % of the samples were not received: figures that depend on them are left out, the others are of those that were.',
+    '有 {percent} % 的采样未收到：依赖这些采样的指标未给出，其余指标仅来自已收到的采样。',
+  ],
   'step.numbers': ['Numbers of the step', '阶跃数值'],
   'step.torque': ['Torque during the step', '阶跃转矩'],
   'step.torqueUnit': ['% of rated', '额定转矩 %'],

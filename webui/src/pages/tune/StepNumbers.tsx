@@ -6,6 +6,7 @@ import { Legend } from '../response/Legend'
 import type { Step } from '../response/results'
 import { StepPlot, type Trace } from '../response/StepPlot'
 import { TRACE_COLORS } from '../scope/channels'
+import { engineering } from './steps'
 
 /** A step's curves and its numbers; `over` is an earlier one, drawn on the same axes. */
 export function StepNumbers({ step, over = null }: { step: Step; over?: Step | null }) {
@@ -40,6 +41,11 @@ export function StepNumbers({ step, over = null }: { step: Step; over?: Step | n
         dark={dark}
         height={150}
       />
+      {step.lost_percent > 0 && (
+        <p className="note warn">
+          {t('step.samplesLost', { percent: engineering(step.lost_percent) })}
+        </p>
+      )}
       <div className="scroll-table">
         <table aria-label={t('step.numbers')}>
           <thead>
