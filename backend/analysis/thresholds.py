@@ -1065,6 +1065,18 @@ class repeat_band:
     """[ratio] Origin: c7efa439."""
 
 
+class load_response:
+    """`response/load_response.py`."""
+
+    FEWEST = 100
+    """[count] Samples below which a recording shows no scale. Origin: 22dd7a08."""
+    LEFT = 0.02
+    """[ratio] An encoder does not follow the motor where more than this share of the power of its
+    motion is not the motor's. Origin: 22dd7a08."""
+    NEAR = 9
+    """[lines] So many lines around one have an error of the torque in common. Origin: 22dd7a08."""
+
+
 class reported:
     """`response/reported.py`."""
 

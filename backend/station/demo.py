@@ -23,7 +23,7 @@ from drivers.link import Found, Link
 from drivers.texts.message import Text, text
 from drivers.texts.validation import reason_of
 from drivers.urls import link_for
-from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, BenchSpec, load_bench, write_bench
+from drivers.virtual.bench import AxisSpec, BenchSpec, bench_file, load_bench, write_bench
 from drivers.virtual.defects import DEFECT_WORDS
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, NamespaceUnavailable
@@ -42,6 +42,7 @@ _PAUSE_S = 1.0
 class DemoBench:
     """Starts the wires of a bench file and holds their real addresses.
 
+    ``bench``: the file, the name of a bench of the product, or None for the standard bench.
     ``segment_options``: options of the EtherCAT segments (see drivers.virtual.wires.ethercat). With
     ``steady`` a cycle that is late because the computer is busy does not count as late in the
     drives. ``defects``: defects in addition to those of the file, each as ``AXIS=DEFECT``.
@@ -60,7 +61,7 @@ class DemoBench:
     ) -> None:
         self._steady = steady
         self._segment_options = tuple(segment_options)
-        self._file = bench or STANDARD_BENCH
+        self._file = bench_file(bench)
         self._folder = folder
         if defects:
             folder.mkdir(parents=True, exist_ok=True)

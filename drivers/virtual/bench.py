@@ -54,6 +54,8 @@ from profiles.loader import ProfileError, load_profile
 #: the positions of an EtherCAT segment (16-bit addresses).
 _LAST_STATION = {"mlink": 247, "modbus": 247, "canopen": 127, "ethercat": 65535}
 STANDARD_BENCH = Path(__file__).with_name("standard_bench.toml")
+#: Further benches of the product, by the name that ``servodeck demo --bench`` takes.
+NAMED_BENCHES = {"gantry": Path(__file__).with_name("gantry_bench.toml")}
 
 
 class AxisSpec(BaseModel):
@@ -108,6 +110,16 @@ class BenchSpec(BaseModel):
     def on(self, url: str) -> list[tuple[AxisSpec, int]]:
         """Return the drives on a bus with their stations there."""
         return [(axis, s) for axis in self.axis for u, s in axis.ports if u == url]
+
+
+def bench_file(chosen: Path | None) -> Path:
+    """Return the file of a bench: itself, that of a name, or of the standard bench for None.
+
+    An existing file comes before a name.
+    """
+    if chosen is None:
+        return STANDARD_BENCH
+    return chosen if chosen.exists() else NAMED_BENCHES.get(str(chosen), chosen)
 
 
 def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:

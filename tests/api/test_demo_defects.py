@@ -1,16 +1,18 @@
 """``servodeck demo --defect``: the command is started with defects, and the tools find them.
 
-The bench file is healthy. The defects here are those of a motor and its brake; a loose coupling and
-a worn belt are found in simulated time (`tests/virtual/tools`), a gantry out of square through the
-page (`tests/browser`), all on benches that `DemoBench` makes as the command does.
+The bench files are healthy: one of this test for the defects of a motor and its brake, and those of
+the product for a loose coupling, a worn belt and a gantry out of square. Those are found in
+simulated time as well (`tests/virtual/tools`), and a gantry through the page (`tests/browser`).
 """
 
 from __future__ import annotations
 
+import math
 import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,16 @@ from typing import Any
 import httpx
 import pytest
 
-from drivers.virtual.defects import DEFECT_WORDS, SLIPS, Defect
+from backend.tools.wire_message import MessageInfo, words_of
+from drivers.virtual.defects import (
+    DEFECT_WORDS,
+    LOOSE,
+    OUT_OF_SQUARE_RAD,
+    SLIPS,
+    WORN,
+    WORN_BACKLASH_RAD,
+    Defect,
+)
 from drivers.virtual.wires.netns import unavailable
 from tests.support.station import NO_CERTIFICATES, until
 
@@ -73,10 +84,15 @@ class Demo:
         assert answer.is_success, answer.text
         return answer.json()
 
+    def exchange(self, cycle_us: int, url: str = "ethercat://virtual0") -> None:
+        """Start the cyclic exchange of a segment."""
+        body = {"url": url, "cycle_us": cycle_us}
+        assert self.ok(self.http.post("/buses/cyclic", json=body))["cyclic"]["running"]
+
     def measured(self, name: str, tool: str, **asked: object) -> Any:
         """The result of a tool on this axis."""
         path = f"/drives/{self.drives[name]}/jobs/{tool}"
-        begun = self.ok(self.http.post(path, json={**ASKED, **asked}))
+        begun = self.ok(self.http.post(path, json=asked))
 
         def ended() -> Any:
             job = self.ok(self.http.get(f"/jobs/{begun['id']}"))
@@ -93,21 +109,13 @@ class Demo:
         return self.http.get(f"/reports/{made['file']}").text
 
 
-@pytest.fixture(scope="module")
-def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
+@contextmanager
+def running(folder: Path, *arguments: str) -> Iterator[Demo]:
+    """The command with its state in a folder, until it serves; ended afterwards."""
     if reason := unavailable():
         pytest.skip(f"no private network here: {reason}")
-    folder = Path(tmp_path_factory.mktemp("demo"))
-    bench = folder / "bench.toml"
-    axes = [
-        AXIS.format(name=name, station=station, rated=RATED_NM, coulomb=COULOMB_NM)
-        for station, name in enumerate(dict(PLANTED), 1)
-    ]
-    bench.write_text("".join(axes), "utf-8")
     command = [sys.executable, "-m", "backend", "demo", "--port", "0"]
-    command += ["--bench", str(bench), "--config", str(folder / "state")]
-    for name, defect in PLANTED:
-        command += ["--defect", f"{name}={defect}"]
+    command += ["--config", str(folder / "state"), *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         printed = ""
@@ -120,13 +128,29 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
                 raise AssertionError(f"the demo ended: {printed}")
             base = f"{at[1]}/api/v1"
             with httpx.Client(base_url=base, timeout=60.0, verify=NO_CERTIFICATES) as http:
-                demo = Demo(http, printed)
-                cycle = {"url": "ethercat://virtual0", "cycle_us": CYCLE_US}
-                demo.ok(http.post("/buses/cyclic", json=cycle))
-                yield demo
+                yield Demo(http, printed)
         finally:
             process.terminate()
             process.wait(30)
+
+
+def planting(*planted: tuple[str, Defect]) -> list[str]:
+    """Options of the command."""
+    return [part for name, defect in planted for part in ("--defect", f"{name}={defect}")]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
+    folder = Path(tmp_path_factory.mktemp("demo"))
+    bench = folder / "bench.toml"
+    axes = [
+        AXIS.format(name=name, station=station, rated=RATED_NM, coulomb=COULOMB_NM)
+        for station, name in enumerate(dict(PLANTED), 1)
+    ]
+    bench.write_text("".join(axes), "utf-8")
+    with running(folder, "--bench", str(bench), *planting(*PLANTED)) as demo:
+        demo.exchange(CYCLE_US)
+        yield demo
 
 
 def test_every_defect_is_named_at_the_start(demo: Demo) -> None:
@@ -137,7 +161,7 @@ def test_every_defect_is_named_at_the_start(demo: Demo) -> None:
 
 @pytest.mark.parametrize("defect", BY_FIRST_POWER)
 def test_first_power_finds_it_and_names_the_next_step(demo: Demo, defect: Defect) -> None:
-    result = demo.measured(defect, "first-power")
+    result = demo.measured(defect, "first-power", **ASKED)
     code, next_step = BY_FIRST_POWER[defect]
     checks = {each["name"]: each["finding"] for each in result["checks"]}
     assert checks["phases"] == code
@@ -147,10 +171,114 @@ def test_first_power_finds_it_and_names_the_next_step(demo: Demo, defect: Defect
 
 
 def test_the_brake_test_finds_a_brake_that_slips(demo: Demo) -> None:
-    result = demo.measured(SLIPPING, "brake-test", brake_supply_cut=True)
+    result = demo.measured(SLIPPING, "brake-test", **ASKED, brake_supply_cut=True)
     assert result["verdict"] == "slipped"
     # Holding torque of the brake and dry friction of the shaft.
     truth = 100.0 * (SLIPS * RATED_NM + COULOMB_NM) / RATED_NM
     assert result["torque_percent"] == pytest.approx(truth, rel=0.05)
     words = "secure the load, and have the brake repaired or replaced"
     assert words in demo.report(SLIPPING)
+
+
+# --- Defects of the drive train --------------------------------------------------------------
+
+#: Axis of the standard bench: two inertias of these sizes and a spring.
+TRAIN = "Gantry left"
+HEALTH = {
+    "travel_limit": 3.0,
+    "speed_limit": 900.0,
+    "torque_limit": 80.0,
+    "time_limit_s": 60.0,
+    "rated_torque_nm": RATED_NM,
+    "speeds": 3,
+    "slowest_rpm": 60.0,
+    "inertia": False,
+}
+
+
+@dataclass
+class Health:
+    """Health checks of one axis, compared with the baseline in the folder."""
+
+    folder: Path
+
+    def baseline(self) -> None:
+        """Measure and sign three rounds of the healthy bench."""
+        with running(self.folder) as demo:
+            demo.exchange(1000)
+            demo.measured(TRAIN, "health", **HEALTH, rounds=3)
+            path = f"/drives/{demo.drives[TRAIN]}/health"
+            runs = [each["id"] for each in demo.ok(demo.http.get(path))["runs"]]
+            demo.ok(demo.http.post(f"{path}/baseline", json={"runs": runs, "person": "Ann"}))
+
+    def changed(self, defect: Defect) -> dict[str, Any]:
+        """What two rounds find at the next start, which plants a defect."""
+        with running(self.folder, *planting((TRAIN, defect))) as demo:
+            assert f"{TRAIN} has a planted defect: {DEFECT_WORDS[defect].words('en')}" in (
+                demo.printed
+            )
+            demo.exchange(1000)
+            demo.measured(TRAIN, "health", **HEALTH, rounds=2)
+            condition = demo.ok(demo.http.get(f"/drives/{demo.drives[TRAIN]}/health"))
+        found = [each for each in condition["findings"] if each["code"] == "changed"]
+        return {f"{each['quantity']} {each['number']}": each for each in found}
+
+
+def next_step_of(finding: dict[str, Any]) -> str:
+    """The words of the next step."""
+    return words_of((MessageInfo.model_validate(finding["next_step"]),), "en")[0]
+
+
+@pytest.fixture(scope="module")
+def health(tmp_path_factory: pytest.TempPathFactory) -> Health:
+    made = Health(Path(tmp_path_factory.mktemp("health")))
+    made.baseline()
+    return made
+
+
+@pytest.mark.timeout(900)
+def test_the_health_check_finds_a_loose_coupling(health: Health) -> None:
+    found = health.changed("coupling_loose")
+    assert set(found) == {"resonance 1"}, "nothing else has changed"
+    assert found["resonance 1"]["change"] == pytest.approx(math.sqrt(LOOSE) - 1.0, abs=0.02)
+    assert "check the coupling" in next_step_of(found["resonance 1"])
+
+
+@pytest.mark.timeout(900)
+def test_the_health_check_finds_the_friction_of_a_worn_belt(health: Health) -> None:
+    found = health.changed("belt_worn")
+    assert found["friction 1"]["change"] == pytest.approx(WORN - 1.0, abs=0.05)
+    assert "belt" in next_step_of(found["friction 1"])
+
+
+@pytest.fixture(scope="module")
+def gantry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
+    folder = Path(tmp_path_factory.mktemp("gantry"))
+    defects = planting(("Left", "out_of_square"), ("Table", "belt_worn"))
+    with running(folder, "--bench", "gantry", *defects) as demo:
+        yield demo
+
+
+LIMITS = {"travel_limit": 3.0, "speed_limit": 600.0, "torque_limit": 60.0, "time_limit_s": 60.0}
+
+
+def test_the_gantry_tool_finds_a_beam_out_of_square(gantry: Demo) -> None:
+    gantry.exchange(1000)
+    asked = {"partner": "Right", "lead_mm": 10.0, "resolution_hz": 5.0}
+    result = gantry.measured("Left", "gantry", **LIMITS, **asked)
+    assert result["findings"][0]["code"] == "out_of_square"
+    truth_rev = -OUT_OF_SQUARE_RAD / (2 * math.pi)
+    assert result["out_of_square_rev"]["value"] == pytest.approx(truth_rev, rel=0.1)
+    report = gantry.report("Left")
+    assert "The gantry is out of square" in report
+    assert "Correct the reference (homing offset)" in report
+
+
+def test_the_load_side_tool_finds_the_backlash_of_a_worn_belt(gantry: Demo) -> None:
+    gantry.exchange(2000, "ethercat://virtual1")
+    asked = {**LIMITS, "speed_limit": 1200.0, "torque_limit": 80.0, "time_limit_s": 90.0}
+    result = gantry.measured("Table", "load-side", **asked, motor_inertia_kgm2=5e-5)
+    assert result["backlash_deg"]["value"] == pytest.approx(
+        math.degrees(WORN_BACKLASH_RAD), rel=0.05
+    )
+    assert "check coupling, keys, belt tension and gear" in gantry.report("Table")

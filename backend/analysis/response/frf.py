@@ -31,7 +31,7 @@ from backend.analysis.signals.line_spectra import (
 )
 from backend.analysis.thresholds import frf as threshold
 
-__all__ = ["Frf", "Quantity", "Record", "estimate_periodic", "valid_band_hz"]
+__all__ = ["Frf", "Quantity", "Record", "estimate_lines", "estimate_periodic", "valid_band_hz"]
 
 
 @dataclass(frozen=True)
@@ -128,12 +128,39 @@ def estimate_periodic(
     s = collect(records, path, quantity, position=position)
     if coulomb_nm is None:
         coulomb_nm = estimate_coulomb(s, path, quantity)
+    reported = all(record.known_direction is not None for record in records)
+    return estimate_lines(
+        s,
+        path,
+        quantity,
+        coulomb_nm,
+        jitter_s=jitter_s,
+        smooth_lines=smooth_lines,
+        position=position,
+        reported=reported,
+    )
+
+
+def estimate_lines(
+    s: LineSpectra,
+    path: SignalPath,
+    quantity: Quantity,
+    coulomb_nm: float,
+    *,
+    jitter_s: float = 0.0,
+    smooth_lines: int = 4,
+    position: bool = False,
+    reported: bool = False,
+) -> Frf:
+    """Return the estimate of `estimate_periodic` from spectra.
+
+    ``reported``: the direction of motion is known from the torque balance.
+    """
     inputs = continuous_input(s, path, quantity, coulomb_nm, position=position)
     g, _, s_ur = instrument_estimate(s, inputs)
     # The effect of friction on the response is known only in part; that part is added to the band
     # (a larger one would give less weight to the lines that show the speed filter well).
     plain = instrument_estimate(s, continuous_input(s, path, quantity, position=position))[0]
-    reported = all(record.known_direction is not None for record in records)
     # Where friction takes most of the torque, a share of it is large relative to the rest.
     uncertainty = (
         threshold.BY_BALANCE * (g / plain - 1.0)

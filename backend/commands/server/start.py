@@ -75,7 +75,7 @@ def serve(
 def demo(
     host: Host = "127.0.0.1",
     port: Port = 8420,
-    bench: Annotated[Path | None, typer.Option(help="bench file (TOML)")] = None,
+    bench: Annotated[Path | None, typer.Option(help="bench file (TOML), or gantry")] = None,
     defect: Annotated[
         list[str] | None,
         typer.Option(help='plant a defect, as "Feed screw=coupling_loose"; may be repeated'),

@@ -118,8 +118,8 @@ class Experiments:
 class _Steady:
     """Mean torque of both directions that each axis needs, and its friction.
 
-    ``fight`` is half the difference of the two holding torques. All in % of rated torque, with
-    intervals.
+    ``fight`` is half the difference of the two holding torques, in % of the smaller rated torque.
+    The others are in % of the rated torque of their axis. All with intervals.
     """
 
     holding: tuple[GantryValue, GantryValue]
@@ -281,16 +281,18 @@ def _steady(
         mean = 0.5 * (float(a.mean()) + sign * float(b.mean()))
         variance = 0.25 * (float(a.var(ddof=1)) / a.size + float(b.var(ddof=1)) / b.size)
         by_stiffness = moved * abs(float(per_rad @ weights)) if sign > 0 else 0.0
-        half = np.hypot(
-            np.hypot(spread * np.sqrt(variance), threshold.TORQUE_PERCENT), by_stiffness
-        )
+        # Of each torque, as far as the sum contains it.
+        least = threshold.TORQUE_PERCENT * float(np.sum(np.abs(weights)))
+        half = np.hypot(np.hypot(spread * np.sqrt(variance), least), by_stiffness)
         return GantryValue(value=mean, ci95=(mean - float(half), mean + float(half)))
 
     first, second = np.array([1.0, 0.0]), np.array([0.0, 1.0])
+    # The sides oppose each other with equal torques, which are unequal shares of unequal motors.
+    opposed = 0.5 * np.array([1.0, -1.0]) * rated / np.min(rated)
     return _Steady(
         (value(first, 1.0), value(second, 1.0)),
         (value(first, -1.0), value(second, -1.0)),
-        value(np.array([0.5, -0.5]), 1.0),
+        value(opposed, 1.0),
     )
 
 
@@ -299,8 +301,7 @@ def _square_rev(data: Experiments, steady: _Steady, modes: CoupledModes) -> Gant
     stiffness = _stiffness(modes)
     if stiffness is None or not data.torque_known:
         return None
-    # The same share of both rated torques equals half the difference of the two torques in Nm.
-    rated = 0.5 * sum(data.rated_torque_nm)
+    rated = min(data.rated_torque_nm)
     value = steady.fight.value / 100.0 * rated / stiffness.value / _TURN
     low, high = _ends(steady.fight)
     of_torque = 0.5 * (high - low) / 100.0 * rated / stiffness.value / _TURN

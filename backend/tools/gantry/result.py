@@ -88,9 +88,10 @@ class GantryResult(ToolResult):
     """Result; axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
 
     ``holding_percent`` is the mean torque of both directions that each axis needs, without
-    friction, and ``fight_percent`` half their difference: the torque with which the two sides
-    oppose each other. ``out_of_square_rev`` is how far axis 1 is ahead of the position where the
-    beam would be free of it. Where no coupling is visible, neither is stated, nor are modes,
+    friction, in % of its rated torque. ``fight_percent`` is half the difference of both torques in
+    Nm, in % of the smaller rated torque: with it the two sides oppose each other.
+    ``out_of_square_rev`` is how far axis 1 is ahead of the position where the beam would be free of
+    it. Where no coupling is visible, neither is stated, nor are modes,
     inertia and stiffness of the machine. ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling,
     1 for one rigid body; ``relative_gain`` that of axis 1, 1 without coupling.
     """

@@ -9,9 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.mechanics.load_side_samples import GROUP, unwrapped
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.optional import existing
+from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look, speed_move
@@ -21,13 +19,14 @@ from backend.tools.load_side.result import LoadSideResult
 from backend.tools.load_side.settings import LoadSideSettings
 from backend.tools.load_side.texts import TEXTS, report
 from backend.tools.measuring.computing import meanwhile
+from backend.tools.measuring.load_position import load_position
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.moves.go_back import go_back
 from backend.tools.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import load_side_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.cia402 import Mode
-from drivers.errors import NotAllowed, OutOfRange
+from drivers.errors import OutOfRange
 from drivers.texts.message import text
 
 FloatArray = npt.NDArray[np.float64]
@@ -195,26 +194,6 @@ async def run(run: Run, settings: LoadSideSettings) -> LoadSideResult:
     return await meanwhile(
         lambda: evaluate(found, settings, facts), go_back(axis, session, home, envelope, facts)
     )
-
-
-async def load_position(axis: Axis, session: CyclicSession) -> str:
-    """Key of the second encoder's position, which must come with every cycle.
-
-    Raises:
-        NotAllowed: the drive has none, or it is not in the process data.
-    """
-    drive = axis.drive
-    key = drive.key("load_position")
-    if key is None or key not in await existing(drive, (key,)):
-        raise NotAllowed("load-side.no-second-position", drive=drive.name)
-    if not session.carries(drive, key):
-        raise NotAllowed(
-            "measuring.not-part-cyclic-data",
-            drive=drive.name,
-            parameter=key,
-            replace="load position",
-        )
-    return key
 
 
 def _sides(recordings: Sequence[Recording], parts: Sequence[IntArray]) -> Sides:

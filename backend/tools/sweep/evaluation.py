@@ -10,11 +10,13 @@ import numpy as np
 from backend.analysis.loop.margins import bandwidth, closed_from_open, margins, open_from_closed
 from backend.analysis.mechanics.fit_problem import KnownInertia
 from backend.analysis.mechanics.identify import Identification, identify_with_path
+from backend.analysis.mechanics.load_side_samples import unwrapped
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.mechanics.resonance_table import resonance_table
 from backend.analysis.response.distortion import Detected
 from backend.analysis.response.frf import Frf, Quantity, Record, estimate_periodic
+from backend.analysis.response.load_response import load_response, scale_of
 from backend.analysis.response.reported import (
     charged,
     commanded,
@@ -49,6 +51,7 @@ _COMMANDED = text("sweep.torque-is-commanded")
 _SLOW = text("sweep.torque-follows-slowly")
 _SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
 _DROPPED = text("sweep.torque-not-used")
+_STANDS = text("sweep.load-does-not-follow")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,14 @@ class SweepSettings:
 
 
 @dataclass(frozen=True)
+class LoadSide:
+    """The response to the load's position, at the motor shaft, and the encoder's scale."""
+
+    frf: Frf
+    counts_per_motor_rev: float
+
+
+@dataclass(frozen=True)
 class SweepResult:
     """Result: ``frf`` is the best estimate, ``direct`` the one without any model.
 
@@ -115,6 +126,8 @@ class SweepResult:
     """How setpoints are held between cycles, as the drive reports or the recording showed."""
     detected: Detected | None = None
     """Noise and distortion on the lines that were left empty, where there were any."""
+    load: LoadSide | None = None
+    """Of the second encoder, where it was recorded and follows the motor."""
 
 
 def evaluate(
@@ -165,9 +178,36 @@ def evaluate(
     )
     warnings = _warnings(found, saturated, facts)
     found, widened = _widened(found, facts, quantity, by_speed=by_speed)
-    return _mechanics(
-        found, quantity, loop, saturated, _motion_s(records), facts, warnings + widened
+    load, missing = _load_side(records, taken, found, quantity)
+    said = warnings + widened + missing
+    result = _mechanics(found, quantity, loop, saturated, _motion_s(records), facts, said)
+    return replace(result, load=load)
+
+
+def _load_side(
+    records: Records, taken: tuple[Record, ...], found: Identification, quantity: Quantity
+) -> tuple[LoadSide | None, tuple[Text, ...]]:
+    """Response to the position of the second encoder, where it was recorded; or why there is none.
+
+    ``taken`` are the records as they were evaluated for the motor.
+    """
+    counts = [unwrapped(r.also[:, 0]) for _, r in records if r.also is not None]
+    if len(counts) != len(records):
+        return None, ()
+    scale = scale_of(taken, counts)
+    if scale is None:
+        return None, (_STANDS,)
+    frf = load_response(
+        taken,
+        [each / scale.counts_per_rad for each in counts],
+        found.fit.path,
+        quantity,
+        coulomb_nm=found.direct.coulomb_nm,
+        late_s=found.fit.position_delay_s,
+        deviation=scale.deviation,
+        motor=found.direct,
     )
+    return LoadSide(frf, scale.counts_per_rad * 2.0 * np.pi), ()
 
 
 def _widened(

@@ -15,6 +15,7 @@ from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gains import read_gains
 from backend.tools.inertia.probe import Probed
 from backend.tools.measuring import excite
+from backend.tools.measuring.load_position import recorded_load_position
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import Loop, SweepSettings
@@ -38,6 +39,8 @@ class Setup:
     by_speed: bool = False
     """Mechanics by the speed loop's reference, where a closed loop accepts no torque offset."""
     integral_hz: float | None = None
+    also: tuple[str, ...] = ()
+    """Key of the second encoder's position, which is recorded as well where the drive has one."""
 
 
 def check(settings: SweepSettings) -> None:
@@ -138,7 +141,11 @@ async def setup_of(
     if by_speed:
         with contextlib.suppress(NotAllowed):
             integral_hz = (await read_gains(axis, facts)).integral_hz
-    return Setup(1.0 / cycle_s(session), facts, kind, room, rigid, step, by_speed, integral_hz)
+    # Its scale shows where the base motion moves the axis.
+    mechanics = settings.kind == "mechanics" and settings.base_motion
+    also = await recorded_load_position(axis, session) if mechanics else ()
+    rate = 1.0 / cycle_s(session)
+    return Setup(rate, facts, kind, room, rigid, step, by_speed, integral_hz, also)
 
 
 async def drive_limit_percent(axis: Axis) -> float:

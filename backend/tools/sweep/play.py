@@ -155,7 +155,9 @@ async def _play_one(
         if setup.loop != "none":
             await quiet(axis)
         sent = await _to_raw(axis, sequence, setup, settings, start)
-        recording = await play(axis, session, sent, limits, setup.facts.rated_torque_nm, reported)
+        recording = await play(
+            axis, session, sent, limits, setup.facts.rated_torque_nm, reported, also=setup.also
+        )
     return await _as_sent(axis, sequence, settings, setup, sent, start), recording
 
 

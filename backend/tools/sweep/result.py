@@ -36,6 +36,26 @@ class DirectResponse(_Part):
     std_deg: tuple[float | None, ...]
 
 
+class LoadResponse(_Part):
+    """The response to the position of a second encoder at the load, on the lines of the motor's.
+
+    It is the speed of the load at the motor shaft, so that its unit is that of the motor's response
+    and both are equal where the coupling is stiff. How late the drive reports the encoder is not
+    known: it remains in the phase.
+    """
+
+    valid_band_hz: tuple[float, float]
+    frequency_hz: tuple[float, ...]
+    magnitude_db: tuple[float, ...]
+    phase_deg: tuple[float, ...]
+    coherence: tuple[float, ...]
+    std_db: tuple[float | None, ...]
+    std_deg: tuple[float | None, ...]
+    counts_per_motor_rev: float = Field(
+        description="of the encoder, as measured; negative where it counts backwards"
+    )
+
+
 class ModeInfo(_Part):
     """One resonance of the model: α·(s + β)/(s² + 2ζωs + ω²)."""
 
@@ -96,6 +116,9 @@ class SweepAnswer(ToolResult):
     periods_dropped: int
     direct: DirectResponse
     model: ModelInfo | None
+    load: LoadResponse | None = Field(
+        default=None, description="None where the drive has no second encoder, or it shows nothing"
+    )
     warnings: tuple[str, ...] = Field(description="in English")
     warning_messages: tuple[MessageInfo, ...]
 

@@ -15,17 +15,27 @@ from backend.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
-from backend.tools.sweep.evaluation import Records, SweepResult, SweepSettings, evaluate
+from backend.tools.sweep.evaluation import (
+    LoadSide,
+    Records,
+    SweepResult,
+    SweepSettings,
+    evaluate,
+)
 from backend.tools.sweep.plan import Setup
 from backend.tools.sweep.result import (
     DetectedInfo,
     DirectResponse,
+    LoadResponse,
     ModelInfo,
     ResonanceInfo,
     SweepAnswer,
 )
 from backend.tools.tool import Arrays, Meta
 from backend.tools.wire_message import wire_messages, words_of
+
+#: Counts of the second encoder, an array of each realisation.
+_LOAD = "load_counts"
 
 
 def raw_of(
@@ -39,6 +49,8 @@ def raw_of(
         arrays[f"{number}/lines"] = sequence.excitation.lines
         for name, values in recording.arrays().items():
             arrays[f"{number}/{name}"] = values
+        if recording.also is not None:
+            arrays[f"{number}/{_LOAD}"] = recording.also[:, 0]
         e = sequence.excitation
         structure.append(
             {
@@ -112,7 +124,11 @@ def _reevaluated(arrays: Arrays, meta: Meta) -> SweepResult:
             for name in ("position_rad", "velocity_rad_s", "torque_nm", "sent", "offset")
         }
         valid = np.asarray(arrays[f"{number}/valid"], np.bool_)
-        records.append((excite.Sequence(excitation), Recording(rate, **columns, valid=valid)))
+        # Files of older versions, and of drives without a second encoder, do not have it.
+        load = arrays.get(f"{number}/{_LOAD}")
+        also = None if load is None else np.asarray(load, np.float64)[:, None]
+        recording = Recording(rate, **columns, valid=valid, also=also)
+        records.append((excite.Sequence(excitation), recording))
     loop = str(meta["loop"])
     closed: Literal["none", "speed", "position"] = (
         "none" if loop == "none" else "position" if loop == "position" else "speed"
@@ -166,6 +182,7 @@ def answer_of(result: SweepResult) -> SweepAnswer:
         periods_dropped=frf.periods_dropped,
         direct=_direct(result.direct),
         model=None if result.model is None else ModelInfo(**asdict(result.model)),
+        load=None if result.load is None else _load(result.load),
         warnings=words_of(messages, "en"),
         warning_messages=messages,
     )
@@ -178,6 +195,20 @@ def _direct(frf: Frf) -> DirectResponse:
         phase_deg=tuple(frf.phase_deg.tolist()),
         std_db=_numbers(frf.std_db),
         std_deg=_numbers(frf.std_deg),
+    )
+
+
+def _load(load: LoadSide) -> LoadResponse:
+    frf = load.frf
+    return LoadResponse(
+        valid_band_hz=frf.valid_band_hz,
+        frequency_hz=tuple(frf.frequency_hz.tolist()),
+        magnitude_db=tuple(frf.magnitude_db.tolist()),
+        phase_deg=tuple(frf.phase_deg.tolist()),
+        coherence=tuple(frf.coherence.tolist()),
+        std_db=_numbers(frf.std_db),
+        std_deg=_numbers(frf.std_deg),
+        counts_per_motor_rev=load.counts_per_motor_rev,
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from backend.station.demo import DemoBench
 from drivers.errors import NotAllowed
-from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, load_bench
+from drivers.virtual.bench import STANDARD_BENCH, AxisSpec, bench_file, load_bench
 from drivers.virtual.defects import DEFECT_WORDS, DEFECTS
 from drivers.virtual.mechanics.chain import analytic_response
 
@@ -89,6 +89,25 @@ def test_a_gantry_is_bent_and_has_no_coupling_to_loosen(tmp_path: Path) -> None:
     with pytest.raises(NotAllowed) as refused:
         DemoBench(file, tmp_path / "wires", defects=("R=coupling_loose",))
     assert refused.value.code == "virtual.bench-file-defect-needs"
+
+
+def test_the_bench_with_a_gantry_has_a_place_for_every_defect(tmp_path: Path) -> None:
+    """It is chosen by its name, unless a file is called so."""
+    asked = ("Left=out_of_square", "Table=belt_worn", "Table=coupling_loose")
+    bench = DemoBench(Path("gantry"), tmp_path / "wires", defects=asked)
+    assert [name for name, _ in bench.planted] == ["Left", "Table", "Table"]
+    (beam,) = bench.spec.gantry
+    assert beam.square_error_rad != 0.0
+    table = axis_of(bench, "Table").mechanics
+    assert table.load_encoder is not None
+    assert table.load[-1].backlash_rad > 0.0
+    (healthy,) = DemoBench(Path("gantry"), tmp_path).spec.gantry
+    assert healthy.square_error_rad == 0.0
+    own = tmp_path / "gantry"
+    own.write_text(GANTRY.replace('"L"', '"Own"'), "utf-8")
+    (tmp_path / "motor.toml").write_text(MOTOR, "utf-8")
+    assert load_bench(bench_file(own)).axis[0].name == "Own"
+    assert bench_file(None) == STANDARD_BENCH
 
 
 def test_every_defect_has_words_and_the_standard_bench_has_none() -> None:

@@ -57,6 +57,7 @@ def make_profile(
     foe: bool = False,
     remappable: bool = True,
     cycle_min_us: int | None = None,
+    interpolates: bool = False,
 ) -> Profile:
     """A small drive with the process data of MMS7's default set (004:1085, 004:1116-1119)."""
     pdo = PdoSpec(
@@ -110,6 +111,8 @@ def make_profile(
             _parameter("6061:00", "INT8", "ro", "tx"),
             _parameter("6064:00", "INT32", "ro", "tx"),
             _parameter("607A:00", "INT32", "rw", "rx"),
+            *((_parameter("60C2:01", "UINT8"), _parameter("60C2:02", "INT8"))
+              if interpolates else ()),
         ),
         pdo=pdo,
     )  # fmt: skip

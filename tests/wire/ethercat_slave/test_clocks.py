@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 
-from drivers.virtual.wires.ethercat.clock import LockstepClock
+import pytest
+
+from drivers.virtual.wires.ethercat.clock import LockstepClock, SteadyClock
 from drivers.virtual.wires.ethercat.dc import HOP_NS
 
-from .frames import BWR, FRMW, Wire
+from .frames import BWR, FRMW, LRW, SAFEOP, Wire
 
 MS = 1_000_000
 
@@ -137,3 +140,30 @@ def test_sync1_beside_a_faster_sync0_rules_the_exchange() -> None:
     wire.write(0x0981, b"\x03")
     assert dc.exchange_cycle_ns == MS // 2
     assert dc.exchanges_at(start + 500_000)
+
+
+@pytest.mark.parametrize(("exponent", "cycle_ns"), [(-3, 2 * MS), (-4, MS // 5)])
+def test_steady_time_follows_the_frames_also_of_drives_without_sync0(
+    exponent: int, cycle_ns: int
+) -> None:
+    """They have no pulse: the cycle is the interpolation period that the master has set."""
+    wire = Wire(dc=False, interpolates=True)
+    wire.to_preop()
+    wire.download(0x60C2, 1, b"\x02")
+    wire.download(0x60C2, 2, struct.pack("<b", exponent))
+    wire.set_process_data()
+    assert wire.request(SAFEOP) == (SAFEOP, 0)
+    wire.segment.clock = SteadyClock()
+    times = []
+    for _ in range(10):
+        wire.one(LRW, 0, 0, bytes(0x108))
+        times.append(wire.device.time_ns)
+    # However long the computer took for each of them.
+    assert {new - old for old, new in pairwise(times)} == {cycle_ns}
+
+
+def test_drives_without_any_cycle_have_real_time() -> None:
+    wire = Wire(dc=False)
+    wire.to_safeop()
+    wire.segment.clock = SteadyClock()
+    assert wire.segment._cycle_ns() == 0

@@ -6838,9 +6838,10 @@ export interface components {
          * @description Result; axis 1 is the one that the measurement was started on, axis 2 is ``partner``.
          *
          *     ``holding_percent`` is the mean torque of both directions that each axis needs, without
-         *     friction, and ``fight_percent`` half their difference: the torque with which the two sides
-         *     oppose each other. ``out_of_square_rev`` is how far axis 1 is ahead of the position where the
-         *     beam would be free of it. Where no coupling is visible, neither is stated, nor are modes,
+         *     friction, in % of its rated torque. ``fight_percent`` is half the difference of both torques in
+         *     Nm, in % of the smaller rated torque: with it the two sides oppose each other.
+         *     ``out_of_square_rev`` is how far axis 1 is ahead of the position where the beam would be free of
+         *     it. Where no coupling is visible, neither is stated, nor are modes,
          *     inertia and stiffness of the machine. ``coupling`` is √|G12·G21/(G11·G22)|, 0 without coupling,
          *     1 for one rigid body; ``relative_gain`` that of axis 1, 1 without coupling.
          */
@@ -8950,6 +8951,38 @@ export interface components {
             found: components["schemas"]["FoundDrive"][];
             /** Url */
             url: string | null;
+        };
+        /**
+         * LoadResponse
+         * @description The response to the position of a second encoder at the load, on the lines of the motor's.
+         *
+         *     It is the speed of the load at the motor shaft, so that its unit is that of the motor's response
+         *     and both are equal where the coupling is stiff. How late the drive reports the encoder is not
+         *     known: it remains in the phase.
+         */
+        LoadResponse: {
+            /** Coherence */
+            coherence: number[];
+            /**
+             * Counts Per Motor Rev
+             * @description of the encoder, as measured; negative where it counts backwards
+             */
+            counts_per_motor_rev: number;
+            /** Frequency Hz */
+            frequency_hz: number[];
+            /** Magnitude Db */
+            magnitude_db: number[];
+            /** Phase Deg */
+            phase_deg: number[];
+            /** Std Db */
+            std_db: (number | null)[];
+            /** Std Deg */
+            std_deg: (number | null)[];
+            /** Valid Band Hz */
+            valid_band_hz: [
+                number,
+                number
+            ];
         };
         /**
          * LoadSetRequest
@@ -12957,6 +12990,8 @@ export interface components {
              * @enum {string}
              */
             kind: "mechanics" | "speed_loop" | "position_loop";
+            /** @description None where the drive has no second encoder, or it shows nothing */
+            load?: components["schemas"]["LoadResponse"] | null;
             /**
              * Loop
              * @description that was closed meanwhile
@@ -14154,6 +14189,7 @@ export type LibraryEntry = components['schemas']['LibraryEntry'];
 export type LibraryPage = components['schemas']['LibraryPage'];
 export type LineSearchRequest = components['schemas']['LineSearchRequest'];
 export type LineSearchResult = components['schemas']['LineSearchResult'];
+export type LoadResponse = components['schemas']['LoadResponse'];
 export type LoadSetRequest = components['schemas']['LoadSetRequest'];
 export type LoadSideResult = components['schemas']['LoadSideResult'];
 export type LoadSideSettings = components['schemas']['LoadSideSettings'];

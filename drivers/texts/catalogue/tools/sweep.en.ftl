@@ -17,6 +17,7 @@ sweep_feeling-axis-small-torque = probing the axis with a small torque
 sweep_feeling-how-much-torque = probing how much torque the speed loop makes
 sweep_folded-back = above { NUM($highest_hz, format: ".0f") } Hz aliasing hides the response. Nothing is concluded from that range; a shorter cycle measures it
 sweep_going-back-evaluating = going back and evaluating
+sweep_load-does-not-follow = the second encoder does not follow the motor: the response of the load is left out; check its coupling and 60E4h
 sweep_load-nm-pulls-axis = { $drive }: a load of { NUM($pull_nm, format: ".3g") } Nm pulls the axis, so it cannot be measured without a closed loop
     .remedy = measure with the speed or position loop closed
 sweep_looking-load-pulls-axis = looking for a load that pulls the axis

@@ -17,6 +17,7 @@ sweep_feeling-axis-small-torque = 正以小转矩试探轴
 sweep_feeling-how-much-torque = 正在试探速度环产生的转矩
 sweep_folded-back = { NUM($highest_hz, format: ".0f") } Hz 以上，混叠掩盖了响应。不对该范围下结论；更短的周期可测得
 sweep_going-back-evaluating = 正在返回并计算
+sweep_load-does-not-follow = 第二编码器不跟随电机：未给出负载的响应；请检查其联接和 60E4h
 sweep_load-nm-pulls-axis = { $drive }：有 { NUM($pull_nm, format: ".3g") } Nm 的负载作用于轴，因此不能在开环下测量
     .remedy = 请在速度环或位置环闭合时测量
 sweep_looking-load-pulls-axis = 正在检查是否有负载对轴施力

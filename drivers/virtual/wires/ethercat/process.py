@@ -53,6 +53,8 @@ class ProcessData:
         """Outputs were received since Safe-Op was entered."""
         self.written_ns: int | None = None
         """Time of the last outputs; starts the watchdog."""
+        self.interpolation_ns = 0
+        """Period that the master had set in 60C2h when Safe-Op was entered; 0: none."""
 
     @property
     def has_outputs(self) -> bool:
@@ -106,6 +108,7 @@ class ProcessData:
         self.written_ns = None
         self._report.mode = self._mode()
         self._report.cycle_ns = self._clock.exchange_cycle_ns
+        self.interpolation_ns = self._interpolation_ns()
         self._device.advance(now_ns)
         self._latch()
 
@@ -113,6 +116,14 @@ class ProcessData:
         if not self._clock.sync0_requested:
             return _SYNC_MANAGER
         return _SYNC0 if self._clock.sync1_delay_ns is None else _SYNC1
+
+    def _interpolation_ns(self) -> int:
+        try:
+            value, exponent = (self._device.read(0x60C2, sub) for sub in (1, 2))
+        except SdoAbort:
+            return 0
+        power = int.from_bytes(exponent, "little", signed=True)
+        return round(int.from_bytes(value, "little") * 10.0 ** (9 + power))
 
     def stop(self) -> None:
         """Stop all exchange below Safe-Op."""

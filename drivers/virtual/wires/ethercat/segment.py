@@ -120,11 +120,14 @@ class Segment:
         return now
 
     def _cycle_ns(self) -> int:
-        """Return the cycle of the process data; SYNC0 itself may be faster."""
+        """Return the cycle of the process data; SYNC0 itself may be faster.
+
+        Without any SYNC0 it is the interpolation period that the master has set, 0 if none.
+        """
         for slave in self.slaves:
             if slave.dc.sync0_first_ns is not None:
                 return slave.dc.exchange_cycle_ns
-        return 0
+        return max((slave.process.interpolation_ns for slave in self.slaves), default=0)
 
     def _execute(
         self, part: _Datagram, buffer: bytearray, reach: Sequence[Slave], now: int

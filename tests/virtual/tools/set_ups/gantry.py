@@ -52,19 +52,31 @@ SQUARE = GantrySpec(
 )
 
 
-def motor(brake: bool = False) -> MechanicsSpec:
+def motor(
+    brake: bool = False,
+    *,
+    inertia_kgm2: float = 5e-5,
+    rated_nm: float = RATED,
+    coulomb_nm: float = 0.03,
+) -> MechanicsSpec:
     return MechanicsSpec.model_validate(
         {
             "motor": {
-                "inertia_kgm2": 5e-5,
-                "rated_torque_nm": RATED,
+                "inertia_kgm2": inertia_kgm2,
+                "rated_torque_nm": rated_nm,
                 "rated_speed_rpm": 3000,
                 "brake": brake,
             },
-            "friction": {"viscous_nms": 2e-4, "coulomb_nm": 0.03},
+            "friction": {"viscous_nms": 2e-4, "coulomb_nm": coulomb_nm},
             "encoder": {"noise_counts": 4},
         }
     )
+
+
+def unequal(brake: bool = False) -> tuple[MechanicsSpec, MechanicsSpec]:
+    """A motor, and one of about twice its size: another inertia, torque constant and friction."""
+    larger = motor(brake, inertia_kgm2=1.1e-4, rated_nm=2.39, coulomb_nm=0.05)
+    return motor(brake), larger
 
 
 @dataclass
@@ -92,17 +104,21 @@ async def gantry(
     brake: bool = False,
     defects: tuple[Defect, ...] = (),
     joined: bool = True,
+    motors: tuple[MechanicsSpec, MechanicsSpec] | None = None,
 ) -> AsyncIterator[Two]:
     """The beam between both drives, or nothing where they are not ``joined``; ``defects`` are those
-    that the first axis has in the file.
+    that the first axis has in the file. ``motors`` are two equal ones where not given.
     """
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "bench.json"
-        mechanics = motor(brake).model_dump(exclude_defaults=True)
+        both = motors or (motor(brake), motor(brake))
         axes: list[dict[str, Any]] = [
-            {"name": name, "drive": "mms7", "on": URL, "station": n, "mechanics": mechanics}
-            for n, name in enumerate(spec.axes, 1)
-        ]
+            {
+                "name": name, "drive": "mms7", "on": URL, "station": n,
+                "mechanics": each.model_dump(exclude_defaults=True),
+            }
+            for n, (name, each) in enumerate(zip(spec.axes, both, strict=True), 1)
+        ]  # fmt: skip
         axes[0]["defects"] = list(defects)
         bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")] if joined else []}
         file.write_text(json.dumps(bench), "utf-8")

@@ -96,6 +96,11 @@ export const tuning = {
     '尚未显示响应。请测量，或选择已存储的测量。',
   ],
   'response.measured': ['measured', '测量'],
+  'response.load': ['load, by the second encoder', '负载（第二编码器）'],
+  'response.loadIs': [
+    'Load: speed of the second encoder, scaled to the motor shaft. The time by which the drive reports it late is not known and remains in the phase.',
+    '负载：第二编码器的速度，折算到电机轴。驱动器上报该位置的延迟未知，仍包含在相位中。',
+  ],
   'response.other': ['compared with', '对比'],
   'response.withNotches': ['with the notches below', '含下方陷波'],
   'response.band': ['Valid band', '有效频带'],

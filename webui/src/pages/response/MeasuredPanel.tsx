@@ -4,7 +4,7 @@ import type { MeasurementContent, NotchPreviewInfo } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
 import { TRACE_COLORS } from '../scope/channels'
-import { type Curve, filtered, measuredCurve, notchFor } from './bode'
+import { type Curve, filtered, loadCurve, measuredCurve, notchFor } from './bode'
 import { BodePlot, type Marker } from './BodePlot'
 import { ExportButtons } from './ExportButtons'
 import { Legend } from './Legend'
@@ -112,6 +112,7 @@ export function MeasuredPanel({
           rate: sweep.sample_rate_hz,
         })}
       </p>
+      {sweep.load && <p className="dim">{t('response.loadIs')}</p>}
       <CursorTable sweep={now} over={before} cursors={cursors} />
       <ImportedFacts sweep={sweep} />
       {mechanics && <Mechanics sweep={sweep} over={sameAxis ? over : null} notches={notches} />}
@@ -169,14 +170,15 @@ function Mechanics({
   )
 }
 
-/** Labels of the measured, the compared, the filtered curve, and the guide of a view. */
-function useCurveNames(view: LoopView): [string, string, string, string] {
+/** Labels of the measured, the compared, the filtered curve, the guide of a view, and the load. */
+function useCurveNames(view: LoopView): [string, string, string, string, string] {
   const t = useT()
   return [
     t('response.measured'),
     t('response.other'),
     t('response.withNotches'),
     t(`guide.${view}`),
+    t('response.load'),
   ]
 }
 
@@ -185,11 +187,13 @@ function curvesOf(
   before: Sweep | null,
   preview: NotchPreviewInfo | null,
   view: LoopView | null,
-  names: [string, string, string, string],
+  names: [string, string, string, string, string],
   colors: string[],
 ): Curve[] {
   const main = measuredCurve(now, names[0], colors[0] ?? '')
   const found = [main]
+  const load = loadCurve(now, names[4], colors[2] ?? '')
+  if (load) found.push(load)
   if (before) found.push(measuredCurve(before, names[1], colors[3] ?? '', true))
   if (preview?.magnitude_db.length === now.frequency_hz.length) {
     found.push(filtered(main, preview.magnitude_db, preview.phase_deg, names[2], colors[1] ?? ''))

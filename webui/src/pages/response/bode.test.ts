@@ -4,6 +4,7 @@ import {
   fixed,
   gridOf,
   hertz,
+  loadCurve,
   logTicks,
   measuredCurve,
   nearest,
@@ -105,6 +106,33 @@ describe('the frequency axis', () => {
   })
 })
 
+const withLoad: Sweep = {
+  ...sweep,
+  load: {
+    valid_band_hz: [5, 60],
+    frequency_hz: [5, 50, 100],
+    magnitude_db: [40, 22, 31],
+    phase_deg: [270, 240, 100],
+    coherence: [0.99, 0.95, 0.9],
+    std_db: [0.1, 0.3, 1],
+    std_deg: [1, null, 2],
+    counts_per_motor_rev: 131072,
+  },
+}
+
+describe('the load', () => {
+  it('is drawn within its band, with its coherence', () => {
+    const curve = loadCurve(withLoad, 'load', '#00805e')
+    expect(curve?.magnitude).toEqual([40, 22, null])
+    expect(curve?.phase).toEqual([-90, -120, null])
+    expect(curve?.coherence).toEqual([0.99, 0.95, 0.9])
+    expect(curve?.stdMagnitude).toEqual([0.1, 0.3, 1])
+  })
+  it('is not drawn where there is no second encoder', () => {
+    expect(loadCurve(sweep, 'load', '#00805e')).toBeNull()
+  })
+})
+
 describe('export', () => {
   it('has every line, also those without a deviation', () => {
     const rows = toCsv(sweep).split('\r\n')
@@ -113,6 +141,15 @@ describe('export', () => {
     )
     expect(rows[3]).toBe('100,30,200,0.2,,')
     expect(rows).toHaveLength(6)
+  })
+  it('has the load beside the motor, and nothing of it on lines that it lacks', () => {
+    const rows = toCsv(withLoad).split('\r\n')
+    expect(rows[0]).toBe(
+      'frequency_hz,magnitude_db [(rad/s)/Nm],phase_deg,coherence,std_db,std_deg,' +
+        'load_magnitude_db [(rad/s)/Nm],load_phase_deg,load_coherence,load_std_db,load_std_deg',
+    )
+    expect(rows[2]).toBe('50,20,265,0.98,0.5,2,22,240,0.95,0.3,')
+    expect(rows[4]).toBe('400,-3,90,0.9,1,4,,,,,')
   })
   it('draws a picture with escaped words and a gap where a line is missing', () => {
     const svg = bodeSvg(

@@ -38,6 +38,19 @@ export function measuredCurve(sweep: Sweep, label: string, color: string, dashed
   }
 }
 
+/** The response of the load by a second encoder, within its band; null where there is none. */
+export function loadCurve(sweep: Sweep, label: string, color: string): Curve | null {
+  const load = sweep.load
+  if (!load) return null
+  const [low, high] = load.valid_band_hz
+  const outside = load.frequency_hz.map((f) => f < low || f > high)
+  const coherence = load.coherence.map((each, i) => (outside[i] ? 0 : each))
+  return {
+    ...measuredCurve({ ...sweep, ...load, coherence }, label, color),
+    coherence: load.coherence,
+  }
+}
+
 /** An unwrapped phase moved by whole turns so that its lowest lines lie within ±180°. */
 export function wrapWhole(phase: number[], frequency: number[]): number[] {
   const first = phase.slice(0, Math.max(1, Math.ceil(frequency.length / 20)))
@@ -165,20 +178,23 @@ export function fixed(value: number | null | undefined, decimals: number, unit =
   return unit === '' ? text : `${text}${unit === '°' ? '' : ' '}${unit}`
 }
 
-/** Rows for a table calculation: every line with its deviations. */
+/** Rows for a table calculation: every line with its deviations, and those of the load beside. */
 export function toCsv(sweep: Sweep): string {
-  const head = `frequency_hz,magnitude_db [${sweep.unit}],phase_deg,coherence,std_db,std_deg`
-  const rows = sweep.frequency_hz.map((f, i) =>
-    [
-      f,
-      sweep.magnitude_db[i],
-      sweep.phase_deg[i],
-      sweep.coherence[i],
-      sweep.std_db[i] ?? '',
-      sweep.std_deg[i] ?? '',
-    ].join(','),
-  )
-  return [head, ...rows, ''].join('\r\n')
+  const columns = ['phase_deg', 'coherence', 'std_db', 'std_deg'] as const
+  const names = (of: string) => [`${of}magnitude_db [${sweep.unit}]`, ...columns.map((c) => of + c)]
+  const cells = (of: Pick<Sweep, 'magnitude_db' | (typeof columns)[number]>, i: number) => [
+    of.magnitude_db[i] ?? '',
+    ...columns.map((column) => of[column][i] ?? ''),
+  ]
+  const load = sweep.load
+  const at = new Map(load?.frequency_hz.map((f, i) => [f, i]))
+  const head = ['frequency_hz', ...names(''), ...(load ? names('load_') : [])]
+  const rows = sweep.frequency_hz.map((f, i) => [
+    f,
+    ...cells(sweep, i),
+    ...(load ? cells(load, at.get(f) ?? -1) : []),
+  ])
+  return [head, ...rows, []].map((row) => row.join(',')).join('\r\n')
 }
 
 /** A notch that takes a resonance away: as deep as it is high, and wider than it is. */

@@ -39,7 +39,7 @@ export type Sweep = Pick<
   | 'saturated_share'
   | 'warnings'
 > &
-  Partial<Pick<SweepAnswer, 'warning_messages' | 'periods_used'>> & {
+  Partial<Pick<SweepAnswer, 'warning_messages' | 'periods_used' | 'load'>> & {
     resonances: Resonance[]
     imported?: ImportedFacts
     axis?: ImportedAxis | null
