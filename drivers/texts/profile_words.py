@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from drivers.texts.message import Language, text
 from profiles.language.overlay import Language as OverlayLanguage
 from profiles.language.overlay import load_overlay
 from profiles.language.texts import translations
 from profiles.loader import ProfileError, load_profile
+from profiles.schema import Profile
 
 #: Of faults that a profile does not name, or that were identified by the drive's own log.
 FAULT_UNKNOWN = text("drive.fault-not-in-profile")
@@ -40,9 +39,15 @@ class ProfileWords:
         return self._known.get(english, english)
 
 
-@lru_cache(maxsize=8)
+#: By family: the profile as it was loaded, and its texts. An edited profile is another object.
+_known: dict[str, tuple[Profile, dict[str, str]]] = {}
+
+
 def _translated(family: str) -> dict[str, str]:
     try:
-        return translated(family, "zh")
+        profile = load_profile(family)
+        if family not in _known or _known[family][0] is not profile:
+            _known[family] = profile, translated(family, "zh")
+        return _known[family][1]
     except (ProfileError, OSError, UnicodeDecodeError):
         return {}  # of a server that knows other families, or a file that cannot be read
