@@ -30,7 +30,8 @@ class DriveError(Exception):
     """Base of all errors about drives.
 
     ``text`` states what happened: a catalogue code with its parameters, without words. ``drive``,
-    ``parameter``, ``value`` and ``limit`` are facts that a user needs in any language;
+    ``parameter``, ``value`` and ``limit`` are facts that a user needs in any language; ``drive`` is
+    its name, or a message with its place on the bus where a link does not know the name;
     `advice_text` states what to do next. `message`, `remedy` and `advice` are these in English.
     """
 
@@ -43,7 +44,7 @@ class DriveError(Exception):
         code: str | Text,
         /,
         *,
-        drive: str | None = None,
+        drive: str | Text | None = None,
         parameter: str | None = None,
         value: object = None,
         limit: str | Text | None = None,
@@ -102,7 +103,7 @@ class DriveError(Exception):
         known = self.advice_text
         return None if known is None else known.words()
 
-    def at(self, drive: str | None = None, parameter: str | None = None) -> DriveError:
+    def at(self, drive: str | Text | None = None, parameter: str | None = None) -> DriveError:
         """Fill in the drive or parameter if not set by a lower layer; return the error."""
         self.drive = self.drive or drive
         self.parameter = self.parameter or parameter
@@ -171,7 +172,7 @@ class Rejected(DriveError):
         /,
         *,
         abort_code: int,
-        drive: str | None = None,
+        drive: str | Text | None = None,
         parameter: str | None = None,
         value: object = None,
         limit: str | Text | None = None,
@@ -220,7 +221,7 @@ class MotionHalted(NotAllowed):
         /,
         *,
         halt: Halted,
-        drive: str | None = None,
+        drive: str | Text | None = None,
         remedy: str | Text | None = None,
         **params: Param,
     ) -> None:
@@ -233,11 +234,11 @@ class EnvelopeExceeded(MotionHalted):
 
 
 def motion_halted(
-    where: str,
+    where: str | Text,
     halt: Halted,
     *,
     words: Text | str | None = None,
-    drive: str | None = None,
+    drive: str | Text | None = None,
     remedy: str | Text | None = None,
 ) -> MotionHalted:
     """Create the error for a halt of ``where``, the name of a station or a drive.

@@ -142,7 +142,9 @@ class LinkTraits:
 
 def lists_nothing(kind: LinkKind, station: int) -> NotAllowed:
     """Create the error of `Link.enumerate` for a bus whose drives do not list their objects."""
-    return NotAllowed("link.drive-cannot-list-objects", drive=f"station {station}", kind=kind)
+    return NotAllowed(
+        "link.drive-cannot-list-objects", drive=text("link.station", station=station), kind=kind
+    )
 
 
 class RecordsFrames(Protocol):

@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from profiles.record import Frozen
+from profiles.record import BadRecord, Frozen
 
 
 class ParameterGroup(Frozen):
@@ -171,7 +171,7 @@ class BrakeTest(Frozen):
     @model_validator(mode="after")
     def _one_of_both(self) -> BrakeTest:
         if (self.output_function is None) == (self.obstacle is None):
-            raise ValueError("brake_test: give output_function or obstacle, and not both")
+            raise BadRecord("profile.brake-test-one-of")
         return self
 
 

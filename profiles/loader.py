@@ -13,7 +13,7 @@ import os
 import pickle
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,20 +40,33 @@ YAML_ERRORS = (yaml.YAMLError, ValueError, RecursionError)
 CLASS_FIELDS = frozenset({"motion", "safe_in_motion", "motion_origin", "motion_reason"})
 
 
+class Refused(NamedTuple):
+    """A record that the schema refuses: its place in the file, its key, and pydantic's error."""
+
+    place: str
+    label: str
+    error: Mapping[str, Any]
+
+
 class ProfileError(Exception):
     """A profile file is wrong: a code of the catalogue, and facts that state file and place.
 
-    Words are generated where it is shown (`drivers.texts.profile_errors`).
+    ``refused`` are the records that the schema refuses. Words are generated where it is shown
+    (`drivers.texts.profile_errors`).
     """
 
-    def __init__(self, code: str, /, **params: str | int) -> None:
+    def __init__(
+        self, code: str, /, *, refused: Sequence[Refused] = (), **params: str | int
+    ) -> None:
         super().__init__(code, params)
         self.code = code
         self.params: Mapping[str, str | int] = params
+        self.refused = tuple(refused)
 
     def __str__(self) -> str:
         facts = ", ".join(f"{name}={fact}" for name, fact in self.params.items())
-        return f"{self.code} ({facts})"
+        found = [f"; {at} ({label}): {error['msg']}" for at, label, error in self.refused]
+        return f"{self.code} ({facts})" + "".join(found)
 
 
 def user_folder() -> Path:
@@ -161,7 +174,7 @@ def parse_profile(texts: dict[str, str]) -> Profile:
             "profile.refused",
             name=str(merged.get("drive", "?")),
             errors=error.error_count(),
-            detail=_explain(merged, error),
+            refused=_refused(merged, error),
         ) from error
 
 
@@ -205,9 +218,9 @@ def _refuse_own_classes(merged: dict[str, Any]) -> None:
             )
 
 
-def _explain(merged: dict[str, Any], error: ValidationError) -> str:
-    """Return for each error its place in the file, and the message of the schema's library."""
-    lines: list[str] = []
+def _refused(merged: dict[str, Any], error: ValidationError) -> list[Refused]:
+    """Return the first errors, each with its place in the file and the key of its record."""
+    found: list[Refused] = []
     for item in error.errors()[:20]:
         record: Any = merged
         for step in item["loc"][:2]:
@@ -216,8 +229,8 @@ def _explain(merged: dict[str, Any], error: ValidationError) -> str:
             except (KeyError, IndexError, TypeError):
                 break
         label = record.get("key") or record.get("code") or "" if isinstance(record, dict) else ""
-        lines.append(f"{'.'.join(map(str, item['loc']))} ({label}): {item['msg']}")
-    return "; ".join(lines)
+        found.append(Refused(".".join(map(str, item["loc"])), str(label), item))
+    return found
 
 
 def _cache_path(drive: str, files: list[Path]) -> Path:

@@ -17,7 +17,7 @@ from pydantic import Field, field_validator, model_validator
 from profiles.bring_up import BringUp
 from profiles.functions import Functions, referenced_keys
 from profiles.motion.rule import Motion, MotionOrigin, MotionRule
-from profiles.record import Frozen
+from profiles.record import BadRecord, Frozen
 from profiles.stopping import StopClear
 
 DataType = Literal[
@@ -136,7 +136,9 @@ class Parameter(Frozen):
     @model_validator(mode="after")
     def _limits_in_order(self) -> Parameter:
         if self.min_raw is not None and self.max_raw is not None and self.min_raw > self.max_raw:
-            raise ValueError(f"{self.key}: min_raw {self.min_raw} above max_raw {self.max_raw}")
+            raise BadRecord(
+                "profile.limits-reversed", key=self.key, low=self.min_raw, high=self.max_raw
+            )
         return self
 
 
@@ -546,7 +548,9 @@ class Identity(Frozen):
             try:
                 re.compile(pattern)
             except re.error as error:
-                raise ValueError(f"{pattern!r} is no regular expression: {error}") from error
+                raise BadRecord(
+                    "profile.no-regular-expression", pattern=pattern, cause=str(error)
+                ) from error
         return patterns
 
 
@@ -681,10 +685,10 @@ class Profile(Frozen):
         if len(self.by_key) != len(self.parameters):
             counts = Counter(p.key for p in self.parameters)
             twice = sorted(key for key, count in counts.items() if count > 1)
-            raise ValueError(f"{self.drive}: parameter keys appear twice: {', '.join(twice)}")
+            raise BadRecord("profile.keys-twice", keys=", ".join(twice))
         missing = sorted({key for key in _referenced_keys(self) if key not in self.by_key})
         if missing:
-            raise ValueError(f"{self.drive}: unknown parameters referred to: {', '.join(missing)}")
+            raise BadRecord("profile.keys-missing", keys=", ".join(missing))
         return self
 
 

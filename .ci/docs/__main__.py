@@ -28,6 +28,7 @@ def check() -> int:
         *prose.words_in_code(),
         *prose.long_sentences(),
         *prose.long_texts(),
+        *prose.english_titles(),
         *prose.missing_pictures(),
         *pictures.findings(),
     ]

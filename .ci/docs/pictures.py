@@ -96,8 +96,13 @@ def _figures(run: Run) -> Iterator[prose.Finding]:
 def _pictures(run: Run) -> Iterator[prose.Finding]:
     used: set[Path] = set()
     for page in pages():
-        for target in _SHOWN.findall(page.read_text("utf-8")):
-            used.add((page.parent / target).resolve())
+        chinese = page.is_relative_to(prose.DOCS / "zh")
+        for number, line in enumerate(page.read_text("utf-8").splitlines(), 1):
+            for target in _SHOWN.findall(line):
+                file = (page.parent / target).resolve()
+                used.add(file)
+                if chinese and file.suffix != ".svg" and not file.stem.endswith("-zh"):
+                    yield prose.Finding(page, number, f"{file.name} shows the English page")
     for name, wanted in sorted(run.pictures.items()):
         file = IMAGES / name
         if not file.is_file():

@@ -201,6 +201,14 @@ def _split(paragraph: str) -> list[str]:
     return [one for one in re.split(r"(?<=[.!?:;])\s+", plain) if one]
 
 
+def english_titles() -> Iterator[Finding]:
+    """Notes of Chinese pages without a Chinese title: the builder would write "Warning" there."""
+    for page in sorted((DOCS / "zh").rglob("*.md")):
+        for line in prose(page.read_text("utf-8")):
+            if line.text.startswith("!!! ") and not re.search("[\u4e00-\u9fff]", line.text):
+                yield Finding(page, line.number, "a note needs a Chinese title in quotes")
+
+
 def missing_pictures() -> Iterator[Finding]:
     """Pictures that a page shows and that are no files."""
     for page in pages():

@@ -1,21 +1,25 @@
 """Makes every picture of the documentation and the figures that it quotes, in one run.
 
     make pictures
+    python .ci/pictures jog fault          only these chapters (in the order of the story)
 
 The run starts the demo, commissions one axis of it on the page (see `story.py`) and writes
 screenshots, recordings and ``figures.json`` into ``docs/images``; then it writes the figures into
-the pages that quote them. Nothing is changed unless the run comes to its end.
+the pages that quote them. Nothing is changed unless the run comes to its end. A run of some
+chapters replaces their pictures alone: all figures, and the other pictures, stay those of the
+whole run before it.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import shutil
 import sys
 import tempfile
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -35,15 +39,17 @@ TRIES = 3
 SUFFIXES = (".webp", ".png")
 
 
-def photograph(folder: Path, state: Path) -> Story:
-    """Commission the axis; pictures go into ``folder``."""
+def photograph(
+    folder: Path, state: Path, chapters: Sequence[Callable[[Story], None]] = CHAPTERS
+) -> Story:
+    """Commission the axis, as far as these chapters do; pictures go into ``folder``."""
     demo = Demo(state)
     try:
         with sync_playwright() as playwright:
             program = shutil.which("chromium") or "/usr/bin/chromium"
             browser = playwright.chromium.launch(executable_path=program, args=FLAGS)
             story = Story(demo, browser, folder)
-            for chapter in CHAPTERS:
+            for chapter in chapters:
                 began = time.monotonic()
                 print(chapter.__name__, flush=True)
                 through(story, chapter)
@@ -99,15 +105,40 @@ def publish(folder: Path, story: Story, began: datetime) -> pictures.Run:
     return pictures.load()
 
 
+def publish_part(folder: Path, began: datetime, chapters: Sequence[str]) -> pictures.Run:
+    """Put the pictures of some chapters in place of those of the whole run before."""
+    whole = json.loads(pictures.FIGURES.read_text("utf-8"))
+    made = sorted(each for each in folder.iterdir() if each.suffix in SUFFIXES)
+    for each in made:
+        shutil.copy(each, pictures.IMAGES / each.name)
+        whole["pictures"][each.name] = pictures.digest(each)
+    part = {"id": uuid.uuid4().hex[:12], "began": began.isoformat(timespec="seconds")}
+    part |= {"chapters": list(chapters), "pictures": [each.name for each in made]}
+    whole["pictures"] = dict(sorted(whole["pictures"].items()))
+    whole["run"].setdefault("parts", []).append(part)
+    pictures.FIGURES.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", "utf-8")
+    return pictures.load()
+
+
 def main() -> int:
     """Run, publish, and write the figures into the pages."""
+    names = [each.__name__ for each in CHAPTERS]
+    parser = argparse.ArgumentParser(description="Pictures of the documentation.")
+    parser.add_argument("chapters", nargs="*", help=", ".join(names), metavar="CHAPTER")
+    wanted = parser.parse_args().chapters
+    if unknown := [each for each in wanted if each not in names]:
+        parser.error(f"no chapter {', '.join(unknown)}; there are: {', '.join(names)}")
+    chosen = [each for each in CHAPTERS if not wanted or each.__name__ in wanted]
     began = datetime.now(UTC)
     with tempfile.TemporaryDirectory() as name:
         folder, state = Path(name) / "pictures", Path(name) / "state"
         folder.mkdir()
         state.mkdir()
-        story = photograph(folder, state)
-        run = publish(folder, story, began)
+        story = photograph(folder, state, chosen)
+        if wanted:
+            run = publish_part(folder, began, [each.__name__ for each in chosen])
+        else:
+            run = publish(folder, story, began)
     for page in pictures.rewrite(run):
         print(f"figures written: {page.relative_to(pictures.prose.ROOT)}")
     size = sum(each.stat().st_size for each in pictures.IMAGES.iterdir())

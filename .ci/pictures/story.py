@@ -42,6 +42,8 @@ SETTLE_MS = 1500
 TALL = {"viewport": {"width": 1180, "height": 2600}}
 ERROR = "c4"
 LANGUAGES = ("en", "zh")
+START = re.compile("^(Start tuning|开始整定)$")
+VERIFICATION = re.compile("^(Verification|验证)$")
 
 
 class Story:
@@ -163,6 +165,10 @@ class Story:
             self.repeated += 1
             page.reload()
         raise RuntimeError(f"{name}: {reason}")
+
+    def recording(self, name: str, language: str) -> Path:
+        """The file of a recording."""
+        return self.folder / f"recording-{name}{'' if language == 'en' else '-zh'}.webp"
 
     def both(
         self, name: str, show: Callable[[Page], Sequence[Mark]], *, faulty: bool = False
@@ -422,12 +428,18 @@ def _motion(page: Page) -> Sequence[Mark]:
 
 
 def jog(story: Story) -> None:
-    """Hold the button, release it: the axis brakes."""
+    """Hold the button, release it: the axis brakes. In both languages."""
+    for language in LANGUAGES:
+        _jog(story, language)
+
+
+def _jog(story: Story, language: str) -> None:
     for _ in range(TRIES):
         story.ready()
-        with story.page() as page:
+        with story.page(language) as page:
             open_axis(page, AXIS, "motion")
-            button = page.get_by_role("button", name="Hold to move in the positive direction")
+            name = re.compile("^(Hold to move in the positive direction|按住向正方向运动)$")
+            button = page.get_by_role("button", name=name)
             expect(button).to_have_attribute("aria-disabled", "false")
             box = button.bounding_box()
             assert box is not None
@@ -439,8 +451,9 @@ def jog(story: Story) -> None:
                 page.mouse.up()
                 recording.wait(2.5)
             disturbed = page.locator(".jog-panel .note.warn")
-            if page.get_by_text("Ended: released").is_visible() and disturbed.count() == 0:
-                recording.store(story.folder / "recording-jog.webp")
+            ended = page.get_by_text(re.compile("Ended: released|已结束：已松开"))
+            if ended.is_visible() and disturbed.count() == 0:
+                recording.store(story.recording("jog", language))
                 return
         story.repeated += 1
     raise RuntimeError("no jog was undisturbed and ended by the release")
@@ -499,12 +512,27 @@ def designs(story: Story) -> None:
 
 
 def automatic(story: Story) -> None:
-    """All steps in one job, started on the page."""
+    """All steps in one job, started on the page; the figures are those of the English page."""
+    result = _automatic(story, "en")
+    _tuned(story, result)
+
+
+def automatic_chinese(story: Story) -> None:
+    """The same on the Chinese page, undone afterwards: what follows finds the axis as delivered."""
+    result = _automatic(story, "zh")
+    undo = {"before": result["before"], "after": result["after"]}
+    path = f"/drives/{AXIS}/tune/undo"
+    # The page that has just been closed may have control for a moment more.
+    until(lambda: story.demo.http.post(path, json=undo).is_success, 60, "the tuning is undone")
+
+
+def _automatic(story: Story, language: str) -> Any:
+    """The result of the job."""
     for _ in range(TRIES):
         story.ready()
-        with story.page() as page:
+        with story.page(language) as page:
             open_axis(page, AXIS, "tune")
-            start = page.get_by_role("button", name="Start tuning")
+            start = page.get_by_role("button", name=START)
             open_step(page, "automatic")
             start.scroll_into_view_if_needed()
             page.wait_for_timeout(SETTLE_MS)
@@ -519,16 +547,15 @@ def automatic(story: Story) -> None:
                     recording.wait(1)
                 took_s = time.monotonic() - began
                 recording.wait(1)
-                ended = page.locator("#step-automatic").get_by_role("heading", name="Verification")
+                ended = page.locator("#step-automatic").get_by_role("heading", name=VERIFICATION)
                 if ended.count() > 0:
                     ended.scroll_into_view_if_needed()
                 recording.wait(8)
             job = story.demo.ask(f"/jobs/{new}")
             if job["state"] == "done" and job["result"]["applied"] is not None:
-                length_s = recording.store(story.folder / "recording-tune.webp")
+                length_s = recording.store(story.recording("tune", language))
                 print(f"  tune: {took_s:.0f} s, shown in {length_s:.0f} s")
-                _tuned(story, job["result"])
-                return
+                return job["result"]
             print(f"autotune is repeated: {(job['problem'] or {}).get('detail')}")
         story.repeated += 1
     raise RuntimeError("the axis was not tuned")
@@ -591,7 +618,7 @@ def _tune(page: Page) -> Sequence[Mark]:
     page.wait_for_timeout(SETTLE_MS)
     page.locator("ol.path").scroll_into_view_if_needed()
     panel = page.locator("#step-automatic")
-    start = panel.get_by_role("button", name=re.compile("^(Start tuning|开始整定)$"))
+    start = panel.get_by_role("button", name=START)
     return [
         Mark(page.locator("ol.path")),
         Mark(panel.locator(".mantine-SegmentedControl-root").first),
@@ -612,10 +639,20 @@ def _response(page: Page) -> Sequence[Mark]:
 
 def fault(story: Story) -> None:
     """A fault, what the page says about it, and its reset."""
+    for language in LANGUAGES:
+        _fault(story, language)
+    story.ok(f"/drives/{AXIS}/training-fault", "POST")
+    until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
+    story.both("alarms", _alarms, faulty=True)
+    story.demo.http.post(f"/drives/{AXIS}/fault-reset", json={})
+
+
+def _fault(story: Story, language: str) -> None:
     story.ready()
-    with story.page() as page:
+    with story.page(language) as page:
         open_axis(page, AXIS, "alarms")
-        reset = page.get_by_role("button", name="Reset faults").first
+        name = re.compile("^(Reset faults|故障复位)$")
+        reset = page.get_by_role("button", name=name).first
         reset.wait_for()
         with Recording(page) as recording:
             recording.wait(1)
@@ -627,11 +664,7 @@ def fault(story: Story) -> None:
             reset.click()
             until(lambda: story.demo.fresh()["state"] != "Fault", 60, "the fault is reset")
             recording.wait(2.5)
-        recording.store(story.folder / "recording-fault.webp")
-    story.ok(f"/drives/{AXIS}/training-fault", "POST")
-    until(lambda: story.demo.fresh()["state"] == "Fault", 60, "the fault is there")
-    story.both("alarms", _alarms, faulty=True)
-    story.demo.http.post(f"/drives/{AXIS}/fault-reset", json={})
+        recording.store(story.recording("fault", language))
 
 
 def _alarms(page: Page) -> Sequence[Mark]:
@@ -642,5 +675,5 @@ def _alarms(page: Page) -> Sequence[Mark]:
 
 
 CHAPTERS: tuple[Callable[[Story], None], ...] = (
-    connected, scope, pages, jog, measured, designs, automatic, verified, fault,
+    connected, scope, pages, jog, measured, designs, automatic_chinese, automatic, verified, fault,
 )  # fmt: skip

@@ -60,6 +60,7 @@ from backend.station.bench import Bench
 from backend.station.recording.rerun_feed import RerunFeed
 from backend.station.recording.service import Recordings
 from drivers.computer import scheduling
+from drivers.texts.message import language, text
 
 PREFIX = "/api/v1"
 _HERE = Path(__file__).resolve()
@@ -224,7 +225,7 @@ def _add_page(app: FastAPI) -> None:
             raise NotFound("api.nothing", path=path)
         if folder is None:
             return Response(
-                "The web page is not built. Run `make install` and start again.",
+                text("api.page-not-built").words(language()),
                 status_code=503,
                 media_type="text/plain",
             )

@@ -26,7 +26,7 @@ from drivers.errors import (
     Rejected,
     internal_error,
 )
-from drivers.texts.message import Param, Text, as_text, language, text
+from drivers.texts.message import Language, Param, Text, as_text, language, text
 from drivers.texts.validation import refusal_of
 
 log = logging.getLogger(__name__)
@@ -124,7 +124,7 @@ def problem_of(error: Exception) -> Problem:
         title=TITLES.get(error.kind, TITLES["drive-error"]),
         status=status,
         detail=error.text.words(spoken),
-        drive=error.drive,
+        drive=_named(error.drive, spoken),
         parameter=error.parameter,
         value=value,
         limit=None if error.limit_text is None else error.limit_text.words(spoken),
@@ -135,6 +135,11 @@ def problem_of(error: Exception) -> Problem:
         advice=None if advice is None else message_of(advice),
         abort_code=error.abort_code if isinstance(error, Rejected) else None,
     )
+
+
+def _named(drive: str | Text | None, spoken: Language) -> str | None:
+    """The name of the drive, or its place on the bus in the language of the request."""
+    return drive.words(spoken) if isinstance(drive, Text) else drive
 
 
 def message_of(message: Text) -> MessageInfo:

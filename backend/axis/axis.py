@@ -28,6 +28,8 @@ from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError
 from drivers.texts.message import Text, text
+from drivers.texts.modes import mode_text
+from drivers.texts.states import state_text
 from profiles.schema import Raw
 
 __all__ = ["Axis", "Envelope"]
@@ -86,7 +88,7 @@ class Axis(ScaledAxis):
         await self.require_stop_delivered()
         # In a running exchange the loop keeps the setpoints at the actual position.
         aims = self.cyclic_power() is None
-        with self.granted(f"to “{goal.value}”"):
+        with self.granted(text("motion.purpose-state", state=state_text(goal))):
             if mode is not None:
                 if aims:
                     # An axis that is enabled already would follow a stale setpoint of the new mode.
@@ -110,7 +112,10 @@ class Axis(ScaledAxis):
             lasts_s = math.inf if self.enabled_by is not None else UNATTENDED_S
             drive = self.drive
             self._standing = drive.authority.standing(
-                drive.id, "left enabled", lasts_s=lasts_s, ended=self.unattended
+                drive.id,
+                text("motion.purpose-left-enabled"),
+                lasts_s=lasts_s,
+                ended=self.unattended,
             )
         elif self._standing is not None:
             self.drive.authority.end(self._standing)
@@ -202,7 +207,7 @@ class Axis(ScaledAxis):
         if self.cyclic_power() is not None:
             raise NotAllowed("axis.profile-homing-modes-not", drive=drive.name)
         await self.require_planned_scales()
-        with self.granted(cia402.MODE_NAMES[mode], envelope):
+        with self.granted(mode_text(mode), envelope):
             async with self._enabled(mode, envelope):
                 yield
 
@@ -257,7 +262,7 @@ class Axis(ScaledAxis):
         """
         if not by_increments:
             await self.require_planned_scales()
-        with self.granted(cia402.MODE_NAMES[mode]):
+        with self.granted(mode_text(mode)):
             try:
                 await self.go_to_cyclic(session, State.OPERATION_ENABLED, mode, timeout_s)
                 if self.brake_wait_s:

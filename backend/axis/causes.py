@@ -12,7 +12,7 @@ from backend.drive.drive import Drive
 from backend.drive.faults import integer
 from backend.drive.terminals import read_terminals
 from drivers.errors import DriveError
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 
 #: Words in the names of input functions that stop an axis (tables of DI functions in the manuals).
 _STOPPING = ("emergency stop", "external fault", "signal stop")
@@ -34,7 +34,11 @@ async def hints(drive: Drive) -> list[Text]:
 async def _terminals(drive: Drive) -> list[Text]:
     """Active inputs whose function stops the axis."""
     return [
-        text("axis.cause-input", terminal=state.terminal.name, function=state.function_name)
+        text(
+            "axis.cause-input",
+            terminal=state.terminal.name,
+            function=profile_text(drive.profile.drive, state.function_name),
+        )
         for state in await read_terminals(drive)
         if state.terminal.direction == "in"
         and state.on

@@ -19,6 +19,7 @@ from backend.drive.drive import Drive
 from backend.drive.identity import confirm_identity
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
+from drivers.texts.message import text
 
 _CYCLIC = (Mode.CSP, Mode.CSV, Mode.CST)
 _STANDS_S, _TAKEN_S, _POLL_S = 2.0, 2.0, 0.01
@@ -42,7 +43,7 @@ async def keeping_mode(axis: Axis, session: CyclicSession) -> AsyncIterator[None
     (key,) = keys
     before = await drive.raw(key)
     with (
-        axis.granted("motion through the cyclic exchange"),
+        axis.granted(text("motion.purpose-exchange")),
         drive.pending_restores.temporary({key: before}),
     ):
         modes_of_the_loop(drive, session, key)

@@ -31,6 +31,7 @@ from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
 from drivers.texts.message import Text, joined, text
+from drivers.texts.modes import mode_text
 from drivers.texts.states import state_text
 from profiles.schema import Fault
 
@@ -134,7 +135,7 @@ class PowerState:
 
     def granted(
         self,
-        purpose: str,
+        purpose: str | Text,
         envelope: Envelope | None = None,
         *,
         keys: frozenset[str] | None = None,
@@ -336,7 +337,7 @@ class PowerState:
                 "axis.no-mode",
                 drive=drive.name,
                 profile_title=drive.profile.title,
-                mode_names=cia402.MODE_NAMES[mode],
+                mode_names=mode_text(mode),
             )
         key = drive.require("mode")
         await drive.command(key, int(mode), self.grant(key))
@@ -346,9 +347,7 @@ class PowerState:
         deadline = time.monotonic() + 1.0
         while await drive.raw(display) != int(mode):
             if time.monotonic() > deadline:
-                raise NotAllowed(
-                    "axis.not-change", drive=drive.name, mode_names=cia402.MODE_NAMES[mode]
-                )
+                raise NotAllowed("axis.not-change", drive=drive.name, mode_names=mode_text(mode))
             await asyncio.sleep(_POLL_S)
 
     def forbid(self) -> None:

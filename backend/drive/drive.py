@@ -48,7 +48,7 @@ class Drive(ReadableDrive):
         Raises:
             NotAllowed, OutOfRange: as `backend.drive.value_check.checked`.
         """
-        return checked(self.name, parameter, raw)
+        return checked(self.name, self.profile.drive, parameter, raw)
 
     async def write(self, key: str, value: Raw, *, raw: bool = True) -> Reading:
         """Write one parameter and return what was read back.
@@ -117,6 +117,7 @@ class Drive(ReadableDrive):
             except OverflowError as error:
                 raise named(
                     self.name,
+                    self.profile.drive,
                     OutOfRange("drive.no-number", given=value),
                     parameter,
                 ) from error
@@ -188,7 +189,7 @@ class Drive(ReadableDrive):
         try:
             await self._send(port, parameter, value)
         except DriveError as error:
-            raise named(self.name, error, parameter, value) from error
+            raise named(self.name, self.profile.drive, error, parameter, value) from error
         if parameter.access == "wo":
             reading = Reading(parameter.key, value, parameter.to_value(value), time.time())
             self._store([reading])
@@ -283,7 +284,7 @@ class Drive(ReadableDrive):
             problem = error.text if isinstance(error, DriveError) else text("drive.interrupted")
             self._notify_command(parameter, raw, problem)
             if isinstance(error, DriveError):
-                raise named(self.name, error, parameter, raw) from error
+                raise named(self.name, self.profile.drive, error, parameter, raw) from error
             raise
         self._notify_command(parameter, raw)
 

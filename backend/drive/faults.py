@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from backend.drive.drive import Drive
 from backend.drive.readings import Reading
+from drivers.texts.profile_words import FAULT_BY_RECORD, FAULT_LOOK_UP, FAULT_UNKNOWN
 from profiles.schema import Fault
 
 
@@ -59,8 +60,8 @@ def active_faults(drive: Drive, readings: Mapping[str, Reading]) -> list[Fault]:
         found.append(
             Fault(
                 code=f"0x{code:04X}",
-                name="not in the profile",
-                remedies=("look the code up in the manual of this firmware",),
+                name=str(FAULT_UNKNOWN),
+                remedies=(str(FAULT_LOOK_UP),),
                 source="drive",
             )
         )
@@ -92,8 +93,8 @@ def _newest_record(drive: Drive, readings: Mapping[str, Reading]) -> Fault | Non
     found = next((fault for fault in drive.profile.faults if fault.code == code), None)
     if found is None:
         return None
-    # The manual does not state which record is newest (002:12361), so the name has its source.
-    return found.model_copy(update={"name": f"{found.name} (by record 0 of the drive's log)"})
+    # The manual does not state which record is newest (002:12361), so the source is stated.
+    return found.model_copy(update={"causes": (str(FAULT_BY_RECORD), *found.causes)})
 
 
 def integer(reading: Reading | None) -> int | None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from drivers.errors import NotAllowed
 from drivers.link import Address, Link, LinkTraits
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from profiles.schema import LinkSpec, Parameter
 
 #: Addresses per call for register links, which admit a write between two requests of a batch. As
@@ -68,7 +68,7 @@ def address_of(parameter: Parameter) -> Address:
     )
 
 
-def port_for(drive: str, ports: Sequence[Port], parameter: Parameter) -> Port:
+def port_for(drive: str, family: str, ports: Sequence[Port], parameter: Parameter) -> Port:
     """The first port that can carry the parameter of the drive of this name.
 
     Raises:
@@ -81,7 +81,7 @@ def port_for(drive: str, ports: Sequence[Port], parameter: Parameter) -> Port:
         "drive.object-cannot-be-reached",
         drive=drive,
         parameter=parameter.key,
-        name=parameter.name,
+        name=profile_text(family, parameter.name),
         why=unreachable_why(ports, parameter),
     )
 

@@ -84,7 +84,7 @@ class ReadableDrive:
         Raises:
             NotAllowed: none can; the message states which link would.
         """
-        return port_for(self.name, self.ports, parameter)
+        return port_for(self.name, self.profile.drive, self.ports, parameter)
 
     def unreachable_why(self, parameter: Parameter) -> Text | None:
         """Why no port carries the parameter; None where one does."""
@@ -208,7 +208,7 @@ class ReadableDrive:
                 data = await port.link.read(port.station, address_of(parameter))
             reading = self._reading(parameter, data)
         except DriveError as error:
-            raise named(self.name, error, parameter) from error
+            raise named(self.name, self.profile.drive, error, parameter) from error
         self._store([reading])
         return reading
 

@@ -20,7 +20,7 @@ from backend.motion.classes import motion_of
 from backend.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from profiles.schema import Parameter, Raw
 
 #: Time for which the shaft is supervised, and polling period [s]; a drive's own jog turns it at
@@ -45,7 +45,12 @@ async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
     drive = axis.drive
     parameter = drive.parameter(key)
     _require_setting(axis, parameter)
-    purpose = f"set {parameter.key} {parameter.name}" + (f": {reason}" if reason else "")
+    purpose = text(
+        "motion.purpose-set-why" if reason else "motion.purpose-set",
+        key=parameter.key,
+        name=profile_text(drive.profile.drive, parameter.name),
+        reason=reason,
+    )
     with axis.granted(purpose, keys=frozenset({parameter.key})) as grant:
         await _require_rest(axis, parameter)
         await _require_inputs_off(axis, parameter, raw)
@@ -71,7 +76,7 @@ async def assign(axis: Axis, key: str, raw: Raw, reason: str = "") -> Reading:
         drive=drive.name,
         parameter=parameter.key,
         value=raw,
-        name=parameter.name,
+        name=profile_text(drive.profile.drive, parameter.name),
         undone=text("functions.could-not-be-restored", cause=left[0])
         if left
         else text("functions.is-again", before=before),

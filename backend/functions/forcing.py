@@ -24,7 +24,7 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from drivers.texts import limits
 from drivers.texts.answers import sentence
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from profiles.functions import Forcing, TerminalBits
 
 #: A session ends when its page has not renewed it for this time [s].
@@ -284,7 +284,9 @@ class ForcingSessions:
     ) -> JobResult:
         axis, keys = session.axis, session.keys
         held = axis.granted(
-            session.spec.title, keys=frozenset(keys), ended=partial(_end_for, session)
+            profile_text(axis.drive.profile.drive, session.spec.title),
+            keys=frozenset(keys),
+            ended=partial(_end_for, session),
         )
         with held as session.grant:
             return await self._overruling(session, ready, progress)

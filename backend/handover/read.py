@@ -96,7 +96,6 @@ def read_list(
             remedy=text(known),
             name=name,
             elements=several.slaves,
-            what="slaves",
         ) from several
     except BadRow as error:
         raise BadSet("handover.damaged", name=name, shorten=error.why) from error

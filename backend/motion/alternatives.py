@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from backend.motion.grant import NotGranted
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from profiles.schema import Parameter, Profile
 
 Page = Literal["", "motion", "io", "parameters"]
@@ -67,7 +67,7 @@ def alternative_of(profile: Profile, parameter: Parameter) -> Alternative:
             return Alternative(
                 "parameters",
                 f"POST {_DRIVE}/procedures/{procedure.name}",
-                text("motion.door-procedure", title=procedure.title),
+                text("motion.door-procedure", title=profile_text(profile.drive, procedure.title)),
             )
     return _SET
 

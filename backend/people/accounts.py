@@ -22,7 +22,7 @@ from backend.people.login.devices import KnownDevices
 from backend.people.login.turns import HashTurns
 from backend.people.passwords import Passwords, require_good
 from backend.people.records import Account, LoginSession, Token, read
-from backend.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role
+from backend.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role, rights_text
 from backend.store.database import Store
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
@@ -263,9 +263,9 @@ class Accounts:
         if beyond or not scopes:
             raise NotAllowed(
                 "people.cannot-give-token",
-                limit=", ".join(sorted(RIGHTS[account.role])),
+                limit=rights_text(RIGHTS[account.role]),
                 account=account.name,
-                beyond=", ".join(sorted(beyond)) or text("people.no-scope"),
+                beyond=rights_text(beyond) if beyond else text("people.no-scope"),
             )
         if not timedelta(0) < lifetime <= LONGEST_TOKEN:
             raise NotAllowed(

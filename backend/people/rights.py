@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
+
+from drivers.texts.message import Text, joined, text
 
 
 class Right(StrEnum):
@@ -52,3 +55,35 @@ GRANTABLE = frozenset({Right.PARAMETERS, Right.MEASURE, Right.MOTION})
 MOVING = frozenset({Right.MEASURE, Right.MOTION})
 #: Roles that an account may have.
 ACCOUNT_ROLES = (Role.VIEWER, Role.OPERATOR, Role.ADMINISTRATOR)
+
+_ROLE_NAMES: Mapping[Role, Text] = {
+    Role.VIEWER: text("people.role-viewer"),
+    Role.OPERATOR: text("people.role-operator"),
+    Role.ADMINISTRATOR: text("people.role-administrator"),
+    Role.GUEST: text("people.role-guest"),
+}
+_RIGHT_NAMES: Mapping[Right, Text] = {
+    Right.LOOK: text("people.right-look"),
+    Right.FILES: text("people.right-files"),
+    Right.PARAMETERS: text("people.right-parameters"),
+    Right.MEASURE: text("people.right-measure"),
+    Right.MOTION: text("people.right-motion"),
+    Right.STATION: text("people.right-station"),
+    Right.INVITE: text("people.right-invite"),
+    Right.ADMINISTER: text("people.right-administer"),
+}
+
+
+def role_text(role: Role) -> Text:
+    """Return the name of a role."""
+    return _ROLE_NAMES[role]
+
+
+def right_text(right: Right) -> Text:
+    """Return the name of a right."""
+    return _RIGHT_NAMES[right]
+
+
+def rights_text(rights: Iterable[Right]) -> Text:
+    """Return the names of several rights."""
+    return joined((right_text(each) for each in sorted(rights)), ", ")

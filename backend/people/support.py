@@ -18,7 +18,7 @@ from backend.people.credentials import checked_person, digest, new_secret, same_
 from backend.people.elapsed import elapsed_s
 from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from backend.people.identity import Identity
-from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role
+from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role, right_text, rights_text
 from backend.people.throttle import Throttle
 from drivers.errors import NotAllowed
 from drivers.texts import limits
@@ -138,8 +138,8 @@ class Support:
         if beyond := allowed - GRANTABLE:
             raise NotAllowed(
                 "people.no-guest-may",
-                limit=", ".join(sorted(GRANTABLE)),
-                beyond=", ".join(sorted(beyond)),
+                limit=rights_text(GRANTABLE),
+                beyond=rights_text(beyond),
             )
         if sum(i.state != "ended" for i in self._invitations.values()) >= MOST_OPEN:
             raise NotAllowed("people.invitations-open", most_open=MOST_OPEN)
@@ -225,7 +225,7 @@ class Support:
         found = self.of_session(identity.session)
         grant = None if found is None else self.running(found)
         if found is None or grant is None or right not in grant.rights:
-            raise Forbidden("people.guest-may-not-without", drive=drive, right=right)
+            raise Forbidden("people.guest-may-not-without", drive=drive, right=right_text(right))
         if grant.drive is not None and drive != grant.drive:
             raise Forbidden("people.grant-another-axis", drive=drive)
         if right in MOVING and not self.enabled(found.id):
@@ -256,8 +256,8 @@ class Support:
         if beyond := rights - found.allowed:
             raise NotAllowed(
                 "people.invitation-not-allow",
-                limit=", ".join(sorted(found.allowed)) or text("limit.look-only"),
-                beyond=", ".join(sorted(beyond)),
+                limit=rights_text(found.allowed) if found.allowed else text("limit.look-only"),
+                beyond=rights_text(beyond),
             )
         if not rights or not 10.0 <= time_s <= LONGEST_GRANT_S:
             raise NotAllowed(

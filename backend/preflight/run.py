@@ -105,7 +105,5 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
             held.close()
     if process.returncode:
         reason = complaint.decode("utf-8", "replace").strip().rpartition("\n")[2]
-        raise LinkLost(
-            "preflight.measurement-failed", interface=interface or "this computer", reason=reason
-        )
+        raise LinkLost("preflight.measurement-failed", interface=interface or "none", reason=reason)
     return from_json(answer.decode("ascii"))

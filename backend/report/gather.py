@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
@@ -19,7 +19,8 @@ from backend.station.connected_drive import ConnectedDrive
 from backend.station.evaluation import evaluate
 from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed
-from drivers.texts.message import Text, joined, prose, text
+from drivers.texts.message import Language, Text, joined, prose, text
+from drivers.texts.profile_words import ProfileWords
 from profiles.schema import Parameter, Raw
 
 #: Kinds of measurements in the order of the report, which is that of commissioning. Tools that are
@@ -132,20 +133,25 @@ def _measured(store: MeasurementStore, file: str) -> Measured:
 
 
 async def live_facts(
-    bench: Bench, connected: ConnectedDrive, changes: Sequence[Change], about: About
+    bench: Bench,
+    connected: ConnectedDrive,
+    changes: Sequence[Change],
+    about: About,
+    language: Language,
 ) -> Facts:
     """All facts but the measurements; parameters that were changed are read from the drive now.
 
     A drive that does not answer is mentioned in the report and raises no error.
     """
     drive = connected.drive
-    settings, trouble = await _changes(drive, changes)
+    settings, trouble = await _changes(drive, changes, language)
     snapshot = connected.monitor.snapshot
     if not snapshot.fresh:
         why = snapshot.problem or text("report.drive-does-not-answer")
         trouble.append(joined((prose(drive.name), why), ": "))
-    trouble += [prose(f"{fault.code} {fault.name}") for fault in snapshot.faults]
-    named = drive.profile.by_key
+    say = ProfileWords(drive.profile.drive, language)
+    trouble += [prose(f"{fault.code} {say(fault.name)}") for fault in snapshot.faults]
+    named = {key: say(each.name) for key, each in drive.profile.by_key.items()}
     return Facts(
         identity=_identity(bench, drive),
         made=datetime.now(UTC),
@@ -155,8 +161,8 @@ async def live_facts(
         notes=about.notes,
         changes=settings,
         last_change=changes[-1].time if changes else None,
-        unsaved=tuple(sorted(f"{key} {named[key].name}" for key in drive.unsaved)),
-        pending=tuple(sorted(f"{key} {named[key].name}" for key in drive.pending)),
+        unsaved=tuple(sorted(f"{key} {named[key]}" for key in drive.unsaved)),
+        pending=tuple(sorted(f"{key} {named[key]}" for key in drive.pending)),
         trouble=tuple(trouble),
     )
 
@@ -178,8 +184,9 @@ def _identity(bench: Bench, drive: Drive) -> Identity:
 
 
 async def _changes(
-    drive: Drive, changes: Sequence[Change]
+    drive: Drive, changes: Sequence[Change], language: Language
 ) -> tuple[tuple[ChangedSetting, ...], list[Text]]:
+    say = ProfileWords(drive.profile.drive, language)
     rows: list[ChangedSetting] = []
     trouble: list[Text] = []
     for each in net(changes):
@@ -190,15 +197,15 @@ async def _changes(
         if not trouble:
             try:
                 raw = await drive.raw(each.key)
-                now = "" if raw == each.after else shown(parameter, raw)
+                now = "" if raw == each.after else shown(parameter, raw, say)
             except DriveError as error:
                 trouble.append(error.text)
         rows.append(
             ChangedSetting(
                 each.key,
-                parameter.name,
-                shown(parameter, each.before),
-                shown(parameter, each.after),
+                say(parameter.name),
+                shown(parameter, each.before, say),
+                shown(parameter, each.after, say),
                 each.time,
                 now,
             )
@@ -206,16 +213,19 @@ async def _changes(
     return tuple(rows), trouble
 
 
-def shown(parameter: Parameter, raw: int) -> str:
-    """A raw value in engineering units, or with its text in the manual."""
+def shown(parameter: Parameter, raw: int, say: Callable[[str], str] = str) -> str:
+    """A raw value in engineering units, or with its text in the manual as ``say`` gives it."""
     if raw in parameter.enum:
-        return f"{raw}: {parameter.enum[raw]}"
+        return f"{raw}: {say(parameter.enum[raw])}"
     value = parameter.to_value(raw)
     return f"{value} {parameter.unit}".rstrip()
 
 
-async def handed_over_facts(drive: Drive, made: Sequence[HandedOver]) -> tuple[HandedOverFile, ...]:
+async def handed_over_facts(
+    drive: Drive, made: Sequence[HandedOver], language: Language
+) -> tuple[HandedOverFile, ...]:
     """The newest hand-over of each format, compared with the values in the drive now."""
+    say = ProfileWords(drive.profile.drive, language)
     newest = {each.format: each for each in made}
     found = []
     for each in sorted(newest.values(), key=lambda one: one.time):
@@ -227,14 +237,14 @@ async def handed_over_facts(drive: Drive, made: Sequence[HandedOver]) -> tuple[H
             HandedOverFile(
                 each.time, each.person, each.format, each.file, each.sha256, each.set_file,
                 tuple(
-                    (key, drive.parameter(key).name, _text_of(drive.parameter(key), raw))
+                    (key, say(drive.parameter(key).name), _text_of(drive.parameter(key), raw, say))
                     for key, raw in known.items()
                 ),
                 tuple(
                     (
-                        change.key, change.name,
-                        _text_of(drive.parameter(change.key), known[change.key]),
-                        _text_of(drive.parameter(change.key), change.controller),
+                        change.key, say(change.name),
+                        _text_of(drive.parameter(change.key), known[change.key], say),
+                        _text_of(drive.parameter(change.key), change.controller, say),
                     )
                     for change in changed_since(drive.profile, known, now)
                 ),
@@ -243,8 +253,8 @@ async def handed_over_facts(drive: Drive, made: Sequence[HandedOver]) -> tuple[H
     return tuple(found)
 
 
-def _text_of(parameter: Parameter, raw: Raw) -> str:
-    return shown(parameter, raw) if isinstance(raw, int) else str(raw)
+def _text_of(parameter: Parameter, raw: Raw, say: Callable[[str], str]) -> str:
+    return shown(parameter, raw, say) if isinstance(raw, int) else str(raw)
 
 
 # --- files alone -----------------------------------------------------------------------

@@ -100,19 +100,21 @@ def _unpacked(data: bytes, name: str) -> bytes:
 
 
 _KNOWN = (
-    (b"PK\x03\x04", "a zip archive or an Excel workbook", "unpack it, or save it as CSV"),
-    (b"\xd0\xcf\x11\xe0", "an old Excel workbook", "save it as CSV"),
-    (b"%PDF", "a PDF", "export the recording as CSV"),
-    (b"TDSm", "a TDMS file", "export it as CSV or MAT"),
-    (b"\x89PNG", "a picture", "export the recording's numbers as CSV"),
-    (b"<?xml", "an XML file", "export the recording as CSV (TwinCAT Scope: Export, CSV)"),
+    (b"PK\x03\x04", "import.is-zip", "import.unpack-or-csv"),
+    (b"\xd0\xcf\x11\xe0", "import.is-excel-old", "import.save-csv"),
+    (b"%PDF", "import.is-pdf", "import.export-csv"),
+    (b"TDSm", "import.is-tdms", "import.export-csv-mat"),
+    (b"\x89PNG", "import.is-picture", "import.export-csv-numbers"),
+    (b"<?xml", "import.is-xml", "import.export-csv-twincat"),
 )
 
 
 def _refuse_known(data: bytes, name: str) -> None:
     for begin, what, remedy in _KNOWN:
         if data.lstrip(b"\xef\xbb\xbf").startswith(begin):
-            raise BadRecording("import.not-table-numbers", value=name, remedy=remedy, what=what)
+            raise BadRecording(
+                "import.not-table-numbers", value=name, remedy=remedy, what=message(what)
+            )
 
 
 def _decoded(data: bytes, name: str) -> str:

@@ -123,17 +123,21 @@ def _check(settings: ImportSettings, scale: Scale) -> None:
             limit="rad/s, rpm, rev/s, deg/s",
         )
     for what, value in (
-        ("output filter", settings.output_filter_hz),
-        ("current bandwidth", settings.current_bandwidth_hz),
+        ("output-filter", settings.output_filter_hz),
+        ("current-bandwidth", settings.current_bandwidth_hz),
     ):
         if value is not None and not 0.1 <= value <= 1e5:
             raise BadRecording(
-                "import.hz", parameter=what, value=value, limit=limits.between(0.1, 100e3, "Hz")
+                "import.hz",
+                parameter=what,
+                value=value,
+                limit=limits.between(0.1, 100e3, "Hz"),
+                what=text("import.value", name=what),
             )
     if settings.loop_delay_s is not None and not 0.0 <= settings.loop_delay_s <= 0.1:
         raise BadRecording(
             "import.loop-delay",
-            parameter="loop delay",
+            parameter="loop-delay",
             value=settings.loop_delay_s,
             limit=limits.between(0.0, 0.1, "s"),
         )

@@ -12,7 +12,7 @@ from backend.analysis.signals.arrays import FloatArray
 from backend.response_import.contents import Table
 from backend.response_import.errors import BadRecording
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 #: Largest relative deviation of a time step from the median, as for a clock with few digits.
 _JITTER = 0.1
@@ -142,7 +142,7 @@ def signals_of(
             )
     if at is None:
         assert sample_rate_hz is not None
-        _check_rate(sample_rate_hz, name, "sample rate")
+        _check_rate(sample_rate_hz, name, text("import.sample-rate"))
         return Signals(u, y, sample_rate_hz, table.names[first], table.names[second], "rate")
     unit = time_unit or unit_in(table.names[at])
     same = (np.diff(u) == 0.0) & (np.diff(y) == 0.0)
@@ -187,13 +187,12 @@ def _complete(table: Table, used: list[int], name: str) -> list[FloatArray]:
         bad = np.flatnonzero(~np.isfinite(values[:end]))
         if bad.size:
             row = int(bad[0])
-            place = f"line {table.first_line + row}" if table.first_line else f"row {row + 1}"
             raise BadRecording(
                 "import.column-holds-no-number",
                 parameter=table.names[i],
                 value=str(values[row]),
                 name=name,
-                place=place,
+                place=_place(table, row),
                 bad_size=bad.size,
             )
     return [np.asarray(v[:end], dtype=np.float64) for v in columns]
@@ -223,7 +222,14 @@ def _same_clock(
             )
 
 
-def _check_rate(rate: float, name: str, what: str) -> None:
+def _place(table: Table, row: int) -> Text:
+    """The line of a row in a text file; its number in a file that has no lines."""
+    if table.first_line:
+        return text("import.line", number=table.first_line + row)
+    return text("import.row", number=row + 1)
+
+
+def _check_rate(rate: float, name: str, what: Text) -> None:
     if not (np.isfinite(rate) and _SLOWEST_HZ <= rate <= _FASTEST_HZ):
         raise BadRecording(
             "import.hz-give-unit",
@@ -245,8 +251,8 @@ def _clock(
     """
     head = table.names[column]
 
-    def place(row: int) -> str:
-        return f"line {table.first_line + row}" if table.first_line else f"row {row + 1}"
+    def place(row: int) -> Text:
+        return _place(table, row)
 
     kept = np.ones(t.size, dtype=bool)
     steps = np.diff(t)
@@ -313,7 +319,7 @@ def _clock(
             count_nonzero=int(wrong.size),
         )
     rate = 1.0 / pace
-    _check_rate(rate, name, f"sample rate (time in {unit})")
+    _check_rate(rate, name, text("import.sample-rate-in", unit=unit))
     # With a clock of few digits the rate most likely is an integer in hertz.
     nearest = round(rate)
     if nearest and abs(rate - nearest) < 1e-5 * rate:

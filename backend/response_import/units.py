@@ -8,6 +8,7 @@ from typing import Literal
 
 from backend.response_import.errors import BadRecording
 from drivers.texts import limits
+from drivers.texts.message import text
 
 InputUnit = Literal["Nm", "mNm", "A", "mA", "rated", "percent", "permille", "rad/s", "rpm", "1"]
 OutputUnit = Literal["rad/s", "rpm", "rev/s", "deg/s", "m/s", "rad", "rev", "deg", "1"]
@@ -67,14 +68,18 @@ def scale_of(
     factor, kind = _INPUT[input_unit]
     out, moved = _OUTPUT[output_unit]
     for what, value, needs in (
-        ("rated torque", rated_torque_nm, "rated"),
-        ("torque constant", torque_constant_nm_a, "A"),
+        ("rated-torque", rated_torque_nm, "rated"),
+        ("torque-constant", torque_constant_nm_a, "A"),
     ):
         if value is None:
             continue
         if not 0.0 < value < 1e6:
             raise BadRecording(
-                "import.detail", parameter=what, value=value, limit=limits.above_zero()
+                "import.detail",
+                parameter=what,
+                value=value,
+                limit=limits.above_zero(),
+                what=text("import.value", name=what),
             )
         if kind != needs:
             raise BadRecording(
@@ -82,9 +87,10 @@ def scale_of(
                 parameter=what,
                 value=value,
                 limit="rated, percent, permille" if needs == "rated" else "A, mA",
+                what=text("import.value", name=what),
                 input_unit=input_unit,
             )
         factor, kind = factor * value, "Nm"
-    text = "1" if kind == moved else f"({moved})/{'rated torque' if kind == 'rated' else kind}"
-    text = text if text != "(rad/s)/1" else "rad/s"
-    return Scale(factor, out, unit or text, kind == "Nm", moved == "rad/s")
+    ratio = "1" if kind == moved else f"({moved})/{'rated torque' if kind == 'rated' else kind}"
+    ratio = ratio if ratio != "(rad/s)/1" else "rad/s"
+    return Scale(factor, out, unit or ratio, kind == "Nm", moved == "rad/s")

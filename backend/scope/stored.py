@@ -17,6 +17,7 @@ from backend.store.files import StorageFailed, checked_name, new_name, write_ato
 from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
 from drivers.texts import limits
+from drivers.texts.message import Text, text
 
 SETUP_SUFFIX, SNAPSHOT_SUFFIX = ".json", ".sdsnap"
 MAGIC = b"SDSNAP1\n"
@@ -67,14 +68,14 @@ def _checked_header(head: bytes, total_bytes: int, name: str) -> dict[str, Any]:
         header: dict[str, Any] = json.loads(head[begin : begin + min(length, MAX_HEADER_BYTES)])
         rows = [int(trace["rows"]) for trace in header["traces"]]
     except (ValueError, KeyError, TypeError, struct.error) as error:
-        raise _bad(name, "its header cannot be read") from error
+        raise _bad(name, text("scope.header-not-readable")) from error
     expected = begin + length + 16 * sum(rows)
     if not head.startswith(MAGIC) or min(rows, default=0) < 0 or total_bytes != expected:
-        raise _bad(name, f"it has {total_bytes} bytes, and {expected} were to be expected")
+        raise _bad(name, text("scope.length-differs", bytes=total_bytes, expected=expected))
     return header
 
 
-def _bad(name: str, why: str) -> BadSnapshot:
+def _bad(name: str, why: Text) -> BadSnapshot:
     return BadSnapshot("scope.no-snapshot-scope", value=name, why=why)
 
 

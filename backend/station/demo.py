@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -20,7 +20,7 @@ from drivers.computer.processes import SESSIONS
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink
 from drivers.link import Found, Link
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, Unsuitable, text
 from drivers.texts.validation import reason_of
 from drivers.urls import link_for
 from drivers.virtual.bench import AxisSpec, BenchSpec, bench_file, load_bench, write_bench
@@ -74,11 +74,11 @@ class DemoBench:
         #: Factories of the links, by bus URL of the bench.
         self.wires: dict[str, Callable[[], Link]] = {}
         #: Addresses of the same wires for other programs, by bus URL.
-        self.addresses: dict[str, str] = {}
+        self.addresses: dict[str, str | Text] = {}
         self.segments: dict[str, VirtualSegment] = {}
         self._namespaces: list[Namespace] = []
         #: Messages for the user about wires that could not be started.
-        self.problems: list[str] = []
+        self.problems: list[Text] = []
 
     @property
     def names(self) -> dict[tuple[str, int], str]:
@@ -116,7 +116,7 @@ class DemoBench:
             self.stop()
             raise LinkLost(
                 "station.virtual-drives-not-start",
-                get=str(answer.get("error", "the process ended")),
+                get=_said(answer),
             )
         wires = answer["wires"]
         if isinstance(wires, dict):
@@ -135,7 +135,7 @@ class DemoBench:
         try:
             namespace = Namespace.create([(master, slave)])
         except NamespaceUnavailable as error:
-            self.problems.append(f"{url} is left out: {error}")
+            self.problems.append(text("virtual.wire-left-out", url=url, cause=error.why))
             return
         self._namespaces.append(namespace)
         arguments = ["--bench", str(self._file), "--on", url, *self._segment_options]
@@ -149,7 +149,7 @@ class DemoBench:
         launcher = namespace.command(())
         # In lockstep the drives' time advances with the frames, so a late reply is awaited.
         patient = self._steady or "--lockstep" in self._segment_options
-        self.addresses[url] = f"interface {master} in the network of process {namespace.pid}"
+        self.addresses[url] = text("virtual.wire-in-namespace", interface=master, pid=namespace.pid)
         self.wires[url] = partial(
             EthercatLink, master, url=url, launcher=launcher, lockstep=1.0 if patient else 0.0
         )
@@ -171,7 +171,7 @@ class DemoBench:
                 raise LinkLost("station.virtual-drives-ended") from error
             answer = self._read()
         if not answer.get("ok"):
-            raise ValueError(str(answer.get("error", "the process ended")))
+            raise Unsuitable(_said(answer))
         return answer.get("result")
 
     def cause_fault(self, url: str, station: int) -> None:
@@ -309,3 +309,9 @@ async def _connect(bench: Bench, axis: AxisSpec, found: Found | None) -> str:
         record = bench.axis_records.get(drive)
         bench.axis_records.put(drive, record.model_copy(update={"mechanics": mechanics}))
     return drive
+
+
+def _said(answer: Mapping[str, object]) -> Text:
+    """Return why the process of the virtual drives refuses, or that it ended without a message."""
+    said = answer.get("error")
+    return Text.from_wire(said) if isinstance(said, Mapping) else text("virtual.process-ended")

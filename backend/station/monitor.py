@@ -21,7 +21,7 @@ from backend.work.journal import Journal, Level
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, internal_error
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from profiles.schema import Fault
 
 log = logging.getLogger(__name__)
@@ -315,7 +315,10 @@ class Monitor:
             if fault.code not in old:
                 level: Level = "error" if fault.kind == "fault" else "warning"
                 line = text(
-                    "station.fault", kind=fault.kind, fault_code=fault.code, fault_name=fault.name
+                    "station.fault",
+                    kind=fault.kind,
+                    fault_code=fault.code,
+                    fault_name=profile_text(drive.profile.drive, fault.name),
                 )
                 self._journal.add(line, level=level, drive=drive.id)
 

@@ -91,7 +91,7 @@ class SpeedWatch:
         readings = (reported.get(drive.key(role) or "") for role in roles)
         word, position, velocity = (None if r is None else r.integer for r in readings)
         if word is None or (position is None and velocity is None):
-            problem = next((r.error for r in reported.values() if r.error), "no answer")
+            problem = next((r.error for r in reported.values() if r.error), "link.no-answer")
             raise LinkTimeout(problem, drive=drive.name)
         return Sample(time.monotonic(), drive.decode_state(word), position, velocity)
 

@@ -132,7 +132,7 @@ class DriveSetup:
             names = ", ".join(str(s.address) for s in pdo.signals)
             raise NotAllowed(
                 "canopen.node-not-let-mapped",
-                drive=f"node {station}",
+                drive=text("canopen.node", node=station),
                 parameter=refusal.parameter,
                 node=station,
                 names=names,
@@ -155,7 +155,7 @@ class DriveSetup:
         if not same:
             raise NotAllowed(
                 "canopen.fixed-pdo-differs",
-                drive=f"node {station}",
+                drive=text("canopen.node", node=station),
                 parameter=f"{pdo.mapping:04X}:00",
                 node=station,
                 pdo_number=pdo.number + 1,
@@ -181,7 +181,7 @@ class DriveSetup:
         if not opens or (needs_kind and not kept):
             raise NotAllowed(
                 "canopen.fixed-pdo-without-sync",
-                drive=f"node {station}",
+                drive=text("canopen.node", node=station),
                 parameter=f"{pdo.communication:04X}:{1 if not opens else 2:02d}",
                 node=station,
                 pdo_number=pdo.number + 1,

@@ -367,7 +367,7 @@ class CanopenLink:
             try:
                 return await self._in_worker(work, cancelled)
             except DriveError as error:
-                error.at(drive=f"node {station} on {self.url}")
+                error.at(drive=text("canopen.node-on", node=station, url=self.url))
                 raise
 
     # Beneath: what runs on the receiving thread.

@@ -41,7 +41,8 @@ from drivers.motion.setpoint_plan import (
     Motion,
     Phase,
 )
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, prose, text
+from drivers.texts.modes import mode_text
 from drivers.texts.states import state_text
 from profiles.schema import INTEGER_RANGE
 
@@ -538,9 +539,9 @@ class AxisLoop:
     # Parts ---------------------------------------------------------------------------------
 
     @property
-    def _why(self) -> str:
+    def _why(self) -> Text:
         """Why the last motion was ended by force, for messages; empty if it was not."""
-        return "" if self.halted is None else self.halted.words
+        return prose("") if self.halted is None else self.halted.text
 
     def setpoint_now(self, target: int) -> int | None:
         """Return the output value of a target, or None if it is not mapped."""
@@ -548,7 +549,7 @@ class AxisLoop:
 
     def check(self, motion: Motion) -> None:
         """Raise `NotAllowed` if this motion cannot start in the next cycle."""
-        where = f"station {self.station}"
+        where = text("link.station", station=self.station)
         motion.require_mapped(self._out, where)
         if self.state is not State.OPERATION_ENABLED or self.goal is not State.OPERATION_ENABLED:
             if self.halted is not None:
@@ -568,7 +569,7 @@ class AxisLoop:
                 where=where,
                 mode=self._mode,
                 wanted=int(wanted),
-                mode_names=cia402.MODE_NAMES[wanted],
+                mode_names=mode_text(wanted),
             )
         motion.limits.require_watched(self._in, where, motion.target)
         if self.phase is Phase.BRAKING or self._completes_stop:

@@ -11,7 +11,7 @@ from typing import Any
 from drivers import cia402
 from drivers.errors import NotAllowed
 from drivers.feedback import FeedbackScale
-from drivers.texts.message import text
+from drivers.texts.message import Text, text
 
 #: The CiA 402-2 objects that a motion commands and monitors.
 CONTROL, MODE, POSITION, VELOCITY, TORQUE = 0x6040, 0x6060, 0x607A, 0x60FF, 0x6071
@@ -43,7 +43,7 @@ class Limits:
     torque_off_only: bool = False
     """Beyond a limit a torque only becomes zero, without a quick stop."""
 
-    def require_watched(self, inputs: Container[int], where: str, target: int = POSITION) -> None:
+    def require_watched(self, inputs: Container[int], where: Text, target: int = POSITION) -> None:
         """Check that the actual value of each limit is among these objects of the cyclic data.
 
         Where 60F4h is missing, the loop computes the following error of a position ``target`` from
@@ -91,7 +91,7 @@ class Motion:
     offset: int | None = None
     offset_values: array.array[int] | None = None
 
-    def require_mapped(self, outputs: Container[int], where: str) -> None:
+    def require_mapped(self, outputs: Container[int], where: Text) -> None:
         """Check that target and offset are among these objects of the cyclic data.
 
         Raises:
@@ -101,7 +101,7 @@ class Motion:
             if index is not None and index not in outputs:
                 raise NotAllowed("cyclic.not-cyclic-data", where=where, index=index)
 
-    def require_near(self, now: int, speed: float, where: str) -> None:
+    def require_near(self, now: int, speed: float, where: Text) -> None:
         """Check that the first position is no further away than the longest step that follows.
 
         ``now`` is the setpoint [increments] and ``speed`` its change in the last cycle.

@@ -23,6 +23,8 @@ Wire: TypeAlias = dict[str, object]
 _CODE = re.compile(r"[a-z][a-z0-9-]*(\.[a-z0-9][a-z0-9-]*)+(/remedy)?")
 #: Codes of messages that are not in the catalogue.
 PROSE, JOINED = "", "+"
+#: Code of a text of a drive family's profile, by its English original; see `profile_text`.
+OF_PROFILE = "="
 #: Suffix of a code: its remedy, an attribute of the code's entry.
 REMEDY = "/remedy"
 
@@ -136,6 +138,14 @@ class Unsuitable(ValueError):
 def prose(words: str) -> Text:
     """Return text from another source, such as a drive, an operating system or a person."""
     return Text(PROSE, {"words": words})
+
+
+def profile_text(family: str, words: str) -> Text:
+    """Return a name or help of a profile: of a parameter, fault, procedure or terminal.
+
+    Its translations are those of the profile, not of the catalogue.
+    """
+    return Text(OF_PROFILE, {"profile": family, "words": words})
 
 
 def joined(parts: Iterable[Text | str], joint: str = "; ") -> Text:

@@ -7,6 +7,7 @@ quotes. The page renders the same files with the same functions (`webui/src/i18n
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
 from functools import cache
 from numbers import Integral, Real
@@ -17,7 +18,7 @@ from fluent.runtime import FluentBundle, FluentResource
 from fluent.runtime.resolver import Pattern
 from fluent.runtime.types import FluentInt, FluentType
 
-from drivers.texts.message import JOINED, PROSE, Language, Param, Text
+from drivers.texts.message import JOINED, OF_PROFILE, PROSE, Language, Param, Text
 
 CATALOGUE = Path(__file__).with_name("catalogue")
 _LONG = 10**18
@@ -79,11 +80,22 @@ def render(message: Text, language: Language) -> str:
     """Return the sentence; a code missing in the catalogue is shown with its facts."""
     if message.code == PROSE:
         return _as_words(message.params.get("words"), language)
+    if message.code == OF_PROFILE:
+        return _of_profile(message.params, language)
     if message.code == JOINED:
         parts = [_as_words(v, language) for k, v in message.params.items() if k != "joint"]
         joint = str(message.params.get("joint", "; "))
         return (_CHINESE_JOINTS.get(joint, joint) if language == "zh" else joint).join(parts)
     return _pattern(message, language) or _bare(message, language)
+
+
+def _of_profile(facts: Mapping[str, Param], language: Language) -> str:
+    words = _as_words(facts.get("words"), language)
+    if language == "en":
+        return words
+    from drivers.texts.profile_words import ProfileWords  # the profiles are needed only here
+
+    return ProfileWords(_as_words(facts.get("profile"), language), language)(words)
 
 
 def has_text(code: str) -> bool:

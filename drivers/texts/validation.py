@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from drivers.texts.message import Param, Text, Unsuitable, prose, text
+from profiles.record import BadRecord
 
 
 class _Reason(NamedTuple):
@@ -83,6 +84,8 @@ def reason_of(error: Mapping[str, Any]) -> Text:
     cause = context.get("error")
     if isinstance(cause, Unsuitable):  # of a validator of our own
         return cause.why
+    if isinstance(cause, BadRecord):
+        return Text(cause.code, cause.params)
     reason = _REASONS.get(error["type"])
     if reason is None or not set(reason.facts.values()) <= context.keys():
         return prose(error["msg"])

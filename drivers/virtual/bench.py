@@ -33,7 +33,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
-from drivers.texts.message import Text, joined
+from drivers.texts.message import Text, joined, text
+from drivers.texts.message import reason_of as reason_of_failure
 from drivers.texts.profile_errors import profile_error_text
 from drivers.texts.validation import reason_of
 from drivers.urls import parse_url
@@ -144,7 +145,7 @@ def load_bench(path: Path = STANDARD_BENCH) -> BenchSpec:
     except OSError as error:
         raise _wrong(path, f"{error.filename or path}: {error.strerror}") from error
     except (ValueError, AttributeError, TypeError) as error:
-        raise _wrong(path, str(error)) from error
+        raise _wrong(path, reason_of_failure(error)) from error
     _check_names(bench, path)
     _check_stations(bench, path)
     for axis in bench.axis:
@@ -217,8 +218,21 @@ def _no_place(path: Path, name: str, defect: Defect, lacks: str) -> NotAllowed:
     )
 
 
-def _wrong(path: Path, why: Text | str) -> NotAllowed:
-    return NotAllowed("virtual.bench-file", value=str(path), path=str(path), why=why)
+def _wrong(
+    path: Path,
+    why: Text | str,
+    value: object = None,
+    limit: str | Text | None = None,
+) -> NotAllowed:
+    """Create the error for the file; the remedy is that of ``why``, else to read the docs."""
+    return NotAllowed(
+        "virtual.bench-file",
+        value=str(path) if value is None else value,
+        limit=limit,
+        remedy=why.remedy() if isinstance(why, Text) else None,
+        path=str(path),
+        why=why,
+    )
 
 
 def _check_names(bench: BenchSpec, path: Path) -> None:
@@ -259,35 +273,27 @@ def _check_ports(axis: AxisSpec, path: Path) -> None:
             raise _wrong(path, joined((axis.name, error.text), ": ")) from error
         kinds = ", ".join(link.kind for link in profile.links)
         if profile.link(bus.scheme) is None:
-            raise NotAllowed(
-                "virtual.bench-file-no-port",
-                value=url,
-                limit=kinds,
-                path=str(path),
+            why = text(
+                "virtual.no-port",
                 drive_name=axis.name,
                 profile_title=profile.title,
                 scheme=bus.scheme,
+                kinds=kinds,
             )
+            raise _wrong(path, why, url, kinds)
         if bus.scheme == "canopen" and not (bus.is_virtual or bus.place.startswith("slcan/")):
-            raise NotAllowed(
-                "virtual.bench-file-virtual-drive",
-                value=url,
-                limit="canopen://virtual0, canopen://slcan/PATH",
-                path=str(path),
-                drive_name=axis.name,
-                bus=str(bus),
-            )
+            why = text("virtual.no-such-bus", drive_name=axis.name, bus=str(bus))
+            raise _wrong(path, why, url, "canopen://virtual0, canopen://slcan/PATH")
         last = _LAST_STATION[bus.scheme]
         if not 1 <= station <= last:
-            raise NotAllowed(
-                "virtual.bench-file-station-outside",
-                value=station,
-                limit=limits.between(1, last),
-                path=str(path),
+            why = text(
+                "virtual.station-outside",
                 drive_name=axis.name,
+                station=station,
                 url=url,
                 last=last,
             )
+            raise _wrong(path, why, station, limits.between(1, last))
 
 
 def _check_stations(bench: BenchSpec, path: Path) -> None:

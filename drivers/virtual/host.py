@@ -23,7 +23,9 @@ from pathlib import Path
 from typing import Protocol
 
 from drivers.computer import scheduling
-from drivers.errors import DriveError
+from drivers.errors import DriveError, why_of
+from drivers.texts.message import Text
+from drivers.texts.profile_errors import profile_error_text
 from drivers.urls import parse_url
 from drivers.virtual.bench import AxisSpec, BenchSpec, load_bench
 from drivers.virtual.device import Device, SdoAbort, shaft_rev
@@ -237,6 +239,10 @@ class Wires:
             return shaft_rev(device)
 
 
+def _why(error: Exception) -> Text:
+    return profile_error_text(error) if isinstance(error, ProfileError) else why_of(error)
+
+
 def main(argv: list[str] | None = None) -> int:
     """Run until standard input closes."""
     parser = argparse.ArgumentParser(prog="python -m drivers.virtual.host")
@@ -249,7 +255,7 @@ def main(argv: list[str] | None = None) -> int:
         wires = Wires(load_bench(options.bench), options.folder, options.nvm)
         wires.start()
     except (DriveError, ProfileError, ValueError, OSError) as error:
-        _answer({"ready": False, "error": str(error)})
+        _answer({"ready": False, "error": _why(error).to_wire()})
         return 1
     _answer({"ready": True, "wires": wires.real_urls})
     try:
@@ -257,7 +263,7 @@ def main(argv: list[str] | None = None) -> int:
             try:
                 _answer({"ok": True, "result": wires.carry_out(json.loads(line))})
             except (ValueError, KeyError, SdoAbort) as error:
-                _answer({"ok": False, "error": str(error)})
+                _answer({"ok": False, "error": _why(error).to_wire()})
     except KeyboardInterrupt:
         pass
     finally:

@@ -17,7 +17,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import yaml
 from pydantic import Field, ValidationError
 
-from profiles.loader import YAML_ERRORS, ProfileError, user_folder
+from profiles.loader import YAML_ERRORS, ProfileError, Refused, user_folder
 from profiles.record import Frozen
 
 _PROFILES = Path(__file__).parents[1]
@@ -188,7 +188,5 @@ def parse_overlay(label: str, texts: dict[str, str]) -> Overlay:
     try:
         return Overlay.model_validate(merged)
     except ValidationError as error:
-        lines = [f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors()[:20]]
-        raise ProfileError(
-            "profile.overlay-refused", name=label, detail="; ".join(lines)
-        ) from error
+        found = [Refused(".".join(map(str, e["loc"])), "", e) for e in error.errors()[:20]]
+        raise ProfileError("profile.overlay-refused", name=label, refused=found) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,9 @@ from typer.testing import CliRunner
 
 from backend.cli import app
 from backend.station.demo import DemoBench
+from drivers.texts.message import speaking
 
+CHINESE = re.compile("[\u4e00-\u9fff]")
 runner = CliRunner()
 
 
@@ -41,6 +44,21 @@ def test_faults(url: str) -> None:
     found = json.loads(call("faults", url, "--profile", "mms7", "--json"))
     assert found == {"active": [], "past": []}
     assert "20 past faults" in call("faults", url, "--profile", "mms7")
+
+
+def test_texts_of_the_profile_are_chinese_in_chinese(url: str) -> None:
+    """They were English in the middle of Chinese lines; JSON for programs keeps the originals."""
+    with speaking("zh"):
+        shown = call("io", url, "--profile", "mms7")
+        assert "未使用" in shown
+        assert "not used" not in shown
+        value = call("params", "get", url, "6092:01", "--profile", "mms7")
+        gear = call("gear", "r6l", "--kind", "screw", "--lead", "8")
+        plain = json.loads(call("params", "get", url, "6092:01", "--profile", "mms7", "--json"))
+    assert "Feed" not in value
+    assert CHINESE.search(value)
+    assert "Electronic gear" not in gear
+    assert plain[0]["name"] == "Feed"
 
 
 def test_gear_of_a_drive_is_written(url: str) -> None:

@@ -90,6 +90,12 @@ def test_changes_stand_in_the_report(station: Station, drive: str) -> None:
         assert (f"<td>{key}</td>" in page) is (raw != undo["before"][key])
     assert "no loop was measured afterwards" in page
     assert "not saved in its memory" in page
+    chinese = station.ok(
+        station.http.post(f"/drives/{drive}/reports", json=body | {"language": "zh"})
+    )
+    page = station.http.get(f"/reports/{chinese['file']}").text
+    names = [load_profile("mms7").by_key[key].name for key in undo["before"]]
+    assert not [name for name in names if f"<td>{name}</td>" in page]
 
     # Undone, nothing of it is left to show.
     station.ok(station.http.post(f"/drives/{drive}/tune/undo", json=undo))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
+from drivers.texts.profile_errors import profile_error_text
 from profiles import drive_names, load_profile
 from profiles.check import check
 from profiles.export import SCHEMA_FILE, json_schema, show
@@ -71,5 +73,8 @@ parameters:
     ],
 )  # fmt: skip
 def test_slips_are_named(change: tuple[str, str], words: str) -> None:
-    with pytest.raises(ProfileError, match=words.replace("(", r"\(")):
+    with pytest.raises(ProfileError) as refused:
         parse_profile({"p.yaml": GOOD.replace(*change)})
+    said = profile_error_text(refused.value)
+    assert words in said.words()
+    assert re.search("[\u4e00-\u9fff]", said.words("zh"))

@@ -86,10 +86,6 @@ ALLOWED: dict[tuple[str, str], str] = {
         "for word in query.words.lower().split():",
     ): "a person searches the library by words",
     (
-        "backend/commands/buses/virtual.py",
-        'error.text = prose(error.message.removeprefix(f"bench file {file}: "))',
-    ): "the file is a temporary one, which nobody who reads the message knows",
-    (
         "backend/station/recording/capture.py",
         r'words = re.sub(r"[^\w.\-]+", " ", reason, flags=re.ASCII).strip()[:50].strip(" .")',
     ): "the name of a file is made of the words; it is never parsed",

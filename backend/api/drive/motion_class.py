@@ -16,7 +16,7 @@ from backend.audit.asked import note_before
 from backend.people.rights import Right
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
-from drivers.texts.message import text
+from drivers.texts.message import profile_text, text
 from drivers.texts.motion_classes import fixed_text, refusal_text
 from profiles import load_profile
 from profiles.motion.decisions import CannotClassify, classify, forget
@@ -125,7 +125,7 @@ async def _changed(bench: Bench, profile: str, parameter: Parameter) -> MotionCl
             "journal.motion-class",
             title=known.title,
             key=parameter.key,
-            name=parameter.name,
+            name=profile_text(profile, parameter.name),
             motion=parameter.motion,
         )
     )

@@ -48,7 +48,7 @@ from backend.tools.moves import homing, move, procedures
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, profile_text, text
 from drivers.texts.states import state_text
 from profiles.schema import Parameter, Raw
 
@@ -225,7 +225,7 @@ async def _write(
             "journal.parameter-written",
             drive=drive.name,
             key=parameter.key,
-            name=parameter.name,
+            name=profile_text(drive.profile.drive, parameter.name),
             before=str(old.value) if old else text("journal.not-read"),
             after=f"{reading.value} {parameter.unit}".rstrip(),
         ),
@@ -260,7 +260,7 @@ async def write_motion_setting(
             "journal.parameter-written-because" if reason else "journal.parameter-written",
             drive=drive.name,
             key=parameter.key,
-            name=parameter.name,
+            name=profile_text(drive.profile.drive, parameter.name),
             before=str(old.value) if old else text("journal.not-read"),
             after=str(reading.value),
             reason=reason,

@@ -21,6 +21,7 @@ from backend.people.accounts import Accounts
 from backend.people.errors import NoSuchPerson
 from backend.people.identity import Identity
 from backend.people.records import Account, Token
+from backend.people.rights import rights_text, role_text
 from drivers.texts.message import text
 
 router = APIRouter()
@@ -63,7 +64,7 @@ async def make_token(people: ThePeople, record: TheRecord, me: Me, body: NewToke
             "journal.token-made",
             person=me.person,
             name=token.name,
-            scopes=", ".join(sorted(token.scopes)),
+            scopes=rights_text(token.scopes),
         ),
         target=token.name,
         new=", ".join(sorted(token.scopes)),
@@ -125,7 +126,7 @@ async def add_account(
     record.note(
         "account",
         "made",
-        text("journal.account-made", person=me.person, name=made.name, role=made.role),
+        text("journal.account-made", person=me.person, name=made.name, role=role_text(made.role)),
         target=made.name,
         new=made.role,
         person=me.person,
@@ -145,7 +146,12 @@ async def change_account(
         record.note(
             "account",
             "role changed",
-            text("journal.role-changed", person=me.person, name=known.name, role=known.role),
+            text(
+                "journal.role-changed",
+                person=me.person,
+                name=known.name,
+                role=role_text(known.role),
+            ),
             target=known.name,
             old=before,
             new=known.role,

@@ -23,7 +23,7 @@ from backend.api.people.record import TheRecord
 from backend.api.security.gate import require_right
 from backend.api.security.own_session import address_of, with_cookie
 from backend.people.errors import Forbidden, NotLoggedIn
-from backend.people.rights import Right
+from backend.people.rights import Right, rights_text
 from drivers.texts.message import text
 
 router = APIRouter()
@@ -166,7 +166,7 @@ async def grant(
             "journal.granted",
             person=me.person,
             guest=granted.guest,
-            rights=text("people.rights-for", rights=rights, minutes=minutes),
+            rights=text("people.rights-for", rights=rights_text(body.rights), minutes=minutes),
         ),
         target=granted.guest,
         new=f"{rights}, {minutes} min",

@@ -49,11 +49,15 @@ async def make_report(bench: TheBench, connected: TheDrive, request: ReportReque
     first = changes[0].time if changes else None
     chosen = await asyncio.to_thread(_chosen, bench, connected, request.measurements, first)
     facts = await live_facts(
-        bench, connected, changes, About(request.person, request.machine, request.notes)
+        bench,
+        connected,
+        changes,
+        About(request.person, request.machine, request.notes),
+        request.language,
     )
     measured, unusable = await asyncio.to_thread(measured_from, bench.measurements, chosen)
     made = await asyncio.to_thread(handover_log(bench).read, connected.drive.id)
-    handed = await handed_over_facts(connected.drive, made)
+    handed = await handed_over_facts(connected.drive, made, request.language)
     whole = replace(facts, measured=measured, unusable=unusable, handed_over=handed)
     try:
         axis = axis_of(connected.drive, bench.records.station)

@@ -33,12 +33,12 @@ from drivers.link import Found
 from drivers.texts import limits
 from drivers.texts.imports import failure_text, message_of_import, summary_text
 from drivers.texts.message import Text, text
-from profiles import drive_names, load_profile
+from drivers.texts.profile_words import translated
+from profiles import drive_names
 from profiles.importer import ImportFailed, export_eds, export_esi
 from profiles.importer.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
-from profiles.language.overlay import Language, load_overlay
-from profiles.language.texts import translations
+from profiles.language.overlay import Language
 from profiles.loader import user_folder
 from profiles.schema import LinkKind
 
@@ -220,8 +220,8 @@ async def profile_texts(
 ) -> ProfileTexts:
     """Read the texts of a profile in another language, by their English original."""
     with profile_files(profile):
-        known, overlay = load_profile(profile), load_overlay(profile, language)
-    return ProfileTexts(profile=profile, language=language, texts=translations(known, overlay))
+        texts = translated(profile, language)
+    return ProfileTexts(profile=profile, language=language, texts=texts)
 
 
 @router.post("/search-line", status_code=202)

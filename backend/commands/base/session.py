@@ -23,7 +23,7 @@ from backend.work.sleep_watch import SleepWatch
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link
-from drivers.texts.message import Text, language
+from drivers.texts.message import Text, language, text
 from drivers.texts.profile_errors import profile_error_text
 from drivers.urls import link_for
 from profiles.loader import ProfileError
@@ -198,7 +198,7 @@ async def drive_on(
     link.attach(station, facts)
     drive = Drive(
         f"{facts.drive}-{station}",
-        f"{facts.drive} station {station}",
+        text("link.drive-at", drive=facts.drive, station=station).words(language()),
         facts,
         [Port(link, station, spec)],
     )
@@ -210,6 +210,6 @@ def _recognise(link: Link, found: Found) -> str:
     matches = match_profiles(link.kind, found)
     sure = [m for m in matches if m.confidence != "possible"] or matches
     if len(sure) != 1:
-        choices = ", ".join(match.profile.drive for match in matches) or "none"
+        choices = ", ".join(match.profile.drive for match in matches) or "-"
         raise NotAllowed("command.drive-station", station=found.station, choices=choices)
     return sure[0].profile.drive

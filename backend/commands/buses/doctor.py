@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from backend.commands.base.options import Json, Profile, Server, Url, server_for
-from backend.commands.base.printing import print_text, words_of
+from backend.commands.base.printing import note, print_text, words_of
 from backend.commands.base.session import opened, run, show_progress
 from backend.station.doctor import Examined, examined
 from backend.station.doctor import tried as tried_once
@@ -82,7 +82,7 @@ async def _here(
     for number in sorted(found) if station is None else [station]:
         chosen = load_profile(profile) if profile else _fitting(link.kind, found.get(number))
         if chosen is None and station is None and found[number].is_other_device:
-            print_text("printed.no-drive", station=str(number))
+            note("printed.no-drive", station=str(number))  # standard output may be JSON
             continue
         if chosen is not None:
             link.attach(number, chosen)

@@ -15,7 +15,7 @@ from backend.commands.base.session import until_interrupted
 from backend.station.demo import DemoBench
 from drivers.computer.signals import until_asked_to_end
 from drivers.errors import NotAllowed
-from drivers.texts.message import prose
+from drivers.texts.message import Param, Text, as_text, joined
 from drivers.urls import parse_url
 from drivers.virtual.mechanics.spec import load_mechanics, standard_mechanics
 
@@ -65,5 +65,14 @@ def _one_drive(file: Path, folder: Path, nvm: Path | None) -> DemoBench:
     try:
         return DemoBench(file, folder, nvm)
     except NotAllowed as error:
-        error.text = prose(error.message.removeprefix(f"bench file {file}: "))
+        facts = error.text.params
+        if error.code == "virtual.bench-file":
+            error.own_remedy, error.text = error.remedy_text, as_text(_fact(facts["why"]))
+        elif error.code == "virtual.bench-file-see-docs":
+            found = joined((_fact(facts["place"]), _fact(facts["first"])), ": ")
+            error.own_remedy, error.text = error.remedy_text, found
         raise
+
+
+def _fact(fact: Param) -> Text | str:
+    return fact if isinstance(fact, Text) else str(fact)

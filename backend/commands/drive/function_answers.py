@@ -33,11 +33,15 @@ class Past(NamedTuple):
 
 
 class Faults(NamedTuple):
-    """Active and past faults. ``hidden``: number of records that only the maker can read."""
+    """Active and past faults. ``hidden``: number of records that only the maker can read.
+
+    ``family``: the profile that their texts are of.
+    """
 
     active: list[ActiveFault]
     past: list[Past]
     hidden: int
+    family: str
 
 
 class Gear(NamedTuple):
@@ -52,11 +56,12 @@ class Gear(NamedTuple):
     reached: float
     error_ppm: float
     warnings: list[str]
+    family: str
     before: dict[str, int] | None = None
     waits: dict[str, str] | None = None
 
 
-def of_plan(plan: GearPlan) -> Gear:
+def of_plan(plan: GearPlan, family: str) -> Gear:
     """The answer for a plan that this command made."""
     return Gear(
         [(v.parameter.key, v.parameter.name, v.raw) for v in plan.values],
@@ -65,4 +70,5 @@ def of_plan(plan: GearPlan) -> Gear:
         plan.reached,
         plan.error_ppm,
         [each.words(language()) for each in plan.warnings],
+        family,
     )

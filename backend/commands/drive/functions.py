@@ -20,16 +20,16 @@ from backend.functions.regeneration import braking as braking_of
 from backend.scales.gear_calculator import Mechanics, plan_gear
 from drivers.errors import OutOfRange
 from drivers.texts import limits as limit_texts
+from drivers.texts.message import language
+from drivers.texts.profile_words import ProfileWords
 from drivers.texts.validation import reason_of
 from profiles import load_profile
-
-_UNKNOWN = "not in the profile"
 
 
 class _Functions(Protocol):
     """Interface of `local_functions` and `remote_functions`."""
 
-    async def terminals(self, place: Place) -> list[Terminal]: ...
+    async def terminals(self, place: Place) -> tuple[str, list[Terminal]]: ...
 
     async def faults(self, place: Place) -> Faults: ...
 
@@ -52,17 +52,19 @@ def io(
 
     async def work() -> None:
         where = place(url, station, profile, server)
-        states = await _by(where).terminals(where)
+        family, states = await _by(where).terminals(where)
         if as_json:
             print(json.dumps([state._asdict() for state in states], indent=1))
             return
+        say = ProfileWords(family, language())
         for state in states:
+            function = say(state.function_name)
             on = "?" if state.on is None else words_of("printed.on" if state.on else "printed.off")
             twins = ""
             if state.same_function:
                 same = ", ".join(state.same_function)
                 twins = f"  {words_of('printed.same-function', terminals=same)}"
-            print(f"{state.name:6} {on:4} {state.function_name}{twins}")
+            print(f"{state.name:6} {on:4} {function}{twins}")
 
     run(work)
 
@@ -84,14 +86,17 @@ def faults(
             past = [entry._asdict() for entry in found.past]
             print(json.dumps({"active": active, "past": past}, indent=1))
             return
+        say = ProfileWords(found.family, language())
         for fault in found.active:
-            print(f"{fault.kind} {fault.code} {fault.name}")
-            for text in fault.remedies:
-                print(f"    {text}")
+            kind = words_of("printed.warning" if fault.kind == "warning" else "printed.fault")
+            print(f"{kind} {fault.code} {say(fault.name)}")
+            for remedy in fault.remedies:
+                print(f"    {say(remedy)}")
         if not found.active:
             print_text("printed.no-fault-active")
         for entry in found.past:
-            print(f"{entry.record}: {entry.code} {entry.name or entry.error or _UNKNOWN}")
+            name = say(entry.name) if entry.name else entry.error
+            print(f"{entry.record}: {entry.code} {name or words_of('printed.not-in-profile')}")
         if found.hidden:
             print_text("printed.faults-hidden", count=found.hidden)
 
@@ -131,7 +136,7 @@ def gear_command(
             first3=reason_of(first),
         ) from error
     if station is None:
-        _show(of_plan(plan_gear(load_profile(drive), mechanics, None)))
+        _show(of_plan(plan_gear(load_profile(drive), mechanics, None), drive))
         if write:
             raise OutOfRange("command.write-needs-bus-url")
         return
@@ -144,8 +149,9 @@ def gear_command(
 
 
 def _show(plan: Gear) -> None:
+    say = ProfileWords(plan.family, language())
     for key, name, raw in plan.values:
-        print(f"{key} {name}: {raw}")
+        print(f"{key} {say(name)}: {raw}")
     print_text("printed.gear-travel", travel=f"{plan.travel_per_motor_turn:.9g}", unit=plan.unit)
     print_text(
         "printed.gear-increments", increments=f"{plan.reached:.12g}", ppm=f"{plan.error_ppm:.2g}"

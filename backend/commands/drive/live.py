@@ -24,7 +24,7 @@ from websockets.exceptions import WebSocketException
 
 from backend.api.live.messages import Hello, JogEnded, Refused, ScopeInfo
 from backend.commands.base.options import Profile, Server, Station, Url, server_for
-from backend.commands.base.printing import print_text
+from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.remote import authorisation, remote
 from backend.commands.base.session import run
 from backend.commands.drive.samples import Samples, decode
@@ -57,7 +57,7 @@ def jog(
 ) -> None:
     """Turn an axis for as long as this command runs. It moves; Ctrl+C stops it."""
     if not 0 < seconds <= _LONGEST_JOG_S:
-        raise typer.BadParameter(f"--seconds must be above 0, at most {_LONGEST_JOG_S:g}")
+        raise typer.BadParameter(words_of("command.seconds", most=_LONGEST_JOG_S))
 
     async def work() -> None:
         at = _needed(url, server)

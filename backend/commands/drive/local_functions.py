@@ -15,11 +15,11 @@ from backend.scales.gear_calculator import Mechanics
 from drivers.texts.message import language
 
 
-async def terminals(place: Place) -> list[Terminal]:
-    """All terminals, read now."""
+async def terminals(place: Place) -> tuple[str, list[Terminal]]:
+    """The drive family and all terminals, read now."""
     async with drive_at(place.url, place.station, place.profile) as drive:
         states = await read_terminals(drive)
-    return [
+    return drive.profile.drive, [
         Terminal(
             state.terminal.name,
             state.terminal.direction,
@@ -57,7 +57,7 @@ async def faults(place: Place) -> Faults:
             )
             for entry in past
         ],
-        0 if history is None or readable else history.size,
+        0 if history is None or readable else history.size, drive.profile.drive,
     )  # fmt: skip
 
 
@@ -66,7 +66,7 @@ async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
     async with drive_at(place.url, place.station, place.profile) as drive:
         axis = Axis(drive)
         plan = await gears.plan(axis, mechanics)
-        reported = of_plan(plan)
+        reported = of_plan(plan, drive.profile.drive)
         if not write:
             return reported
         change = await gears.write_gear(axis, plan.values)

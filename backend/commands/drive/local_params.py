@@ -31,7 +31,9 @@ async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
     async with drive_at(place.url, place.station, place.profile) as drive:
         readings = await drive.read_many(keys)
         wanted = [drive.parameter(key) for key in keys]
-    return values.show_readings([(p, readings[p.key]) for p in wanted], as_json=as_json)
+    return values.show_readings(
+        [(p, readings[p.key]) for p in wanted], drive.profile.drive, as_json=as_json
+    )
 
 
 async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
@@ -42,7 +44,8 @@ async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
             # All values are checked before the first one is written.
             drive.check_write(parameter.key, value, raw=raw)
         for parameter, value in wanted:
-            print(values.line(parameter, await drive.write(parameter.key, value, raw=raw)))
+            reading = await drive.write(parameter.key, value, raw=raw)
+            print(values.line(parameter, reading, drive.profile.drive))
 
 
 async def dump(
@@ -100,7 +103,7 @@ async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
     content = _content(file)
     async with drive_at(place.url, place.station, place.profile) as drive:
         rows = await _differences(drive, content, file)
-    values.show(rows, as_json=as_json)
+    values.show(rows, content.profile, as_json=as_json)
     return any(row.differs for row in rows)
 
 
@@ -108,7 +111,7 @@ async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> boo
     """Show the differences and write them; return whether the drive kept every value."""
     content = _content(file)
     async with drive_at(place.url, place.station, place.profile) as drive:
-        keys = values.chosen(await _differences(drive, content, file), yes=yes)
+        keys = values.chosen(await _differences(drive, content, file), drive.profile.drive, yes=yes)
         if not keys:
             return True
         result = await parameters.load_set(

@@ -26,6 +26,7 @@ from drivers.texts.imports import failure_text, finding_line, summary_text
 from drivers.texts.message import language, reason_of, text
 from drivers.texts.motion_classes import refusal_text
 from drivers.texts.profile_errors import profile_error_text
+from drivers.texts.profile_words import ProfileWords
 from profiles import drive_names, load_profile
 from profiles.check import check as check_profile
 from profiles.check import coverage, motion_counts, unclassified
@@ -61,10 +62,11 @@ def show(
     print_text(
         "printed.profile-head", title=profile.title, drive=profile.drive, manual=profile.manual
     )
+    say = ProfileWords(drive, language())
     for parameter in profile.parameters:
         number = f" {parameter.number}" if parameter.number else ""
         print(
-            f"{parameter.key}{number}  {parameter.name}  [{parameter.type} {parameter.access}"
+            f"{parameter.key}{number}  {say(parameter.name)}  [{parameter.type} {parameter.access}"
             f"{' ' + parameter.unit if parameter.unit else ''}]  {parameter.source}"
         )
 

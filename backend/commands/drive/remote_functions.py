@@ -10,11 +10,11 @@ from backend.commands.drive.remote_params import remote_drive
 from backend.scales.gear_calculator import Mechanics
 
 
-async def terminals(place: Place) -> list[Terminal]:
-    """All terminals, read now."""
+async def terminals(place: Place) -> tuple[str, list[Terminal]]:
+    """The drive family and all terminals, read now."""
     async with remote_drive(place) as (at, drive):
         reported = await at.ask("GET", f"/drives/{drive.id}/io", IoInfo)
-    return [
+    return drive.profile, [
         Terminal(
             state.name,
             state.direction,
@@ -50,6 +50,7 @@ async def faults(place: Place) -> Faults:
             for entry in history.entries
         ],
         history.size if history.kind == "unreadable" else 0,
+        drive.profile,
     )
 
 
@@ -66,6 +67,7 @@ async def gear(place: Place, mechanics: Mechanics, *, write: bool) -> Gear:
             plan.reached,
             plan.error_ppm,
             plan.warnings,
+            drive.profile,
         )
         if not write:
             return reported

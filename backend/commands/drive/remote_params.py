@@ -30,7 +30,9 @@ async def get(place: Place, keys: list[str], *, as_json: bool) -> bool:
         await at.result(f"/drives/{drive.id}/jobs/read_all", {"keys": keys})
         find = await _rows(at, drive)
         rows = [find(key) for key in keys]
-    return values.show_readings([(row, row.reading) for row in rows], as_json=as_json)
+    return values.show_readings(
+        [(row, row.reading) for row in rows], drive.profile, as_json=as_json
+    )
 
 
 async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
@@ -40,7 +42,8 @@ async def put(place: Place, assignments: list[str], *, raw: bool) -> None:
         for row, value in [values.assignment(find, text) for text in assignments]:
             body = {"raw" if raw or isinstance(value, str) else "value": value}
             path = f"/drives/{drive.id}/parameters/{quote(row.key)}"
-            print(values.line(row, await at.ask("PUT", path, ParameterValue, body=body)))
+            reading = await at.ask("PUT", path, ParameterValue, body=body)
+            print(values.line(row, reading, drive.profile))
 
 
 async def save(place: Place) -> None:
@@ -93,7 +96,7 @@ async def diff(place: Place, file: Path, *, as_json: bool) -> bool:
     """Print the differences; return whether there are any."""
     async with remote_drive(place) as (at, drive):
         _, rows = await _differences(at, drive, file)
-    values.show(rows, as_json=as_json)
+    values.show(rows, drive.profile, as_json=as_json)
     return any(row.differs for row in rows)
 
 
@@ -101,7 +104,7 @@ async def load(place: Place, file: Path, *, yes: bool, other_drive: bool) -> boo
     """Show the differences and write them; return whether the drive kept every value."""
     async with remote_drive(place) as (at, drive):
         kept, rows = await _differences(at, drive, file)
-        keys = values.chosen(rows, yes=yes)
+        keys = values.chosen(rows, drive.profile, yes=yes)
         if not keys:
             return True
         body = {

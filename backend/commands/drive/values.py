@@ -10,10 +10,12 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import typer
 
-from backend.commands.base.printing import print_text, words_of
+from backend.commands.base.printing import note, print_text, words_of
 from backend.parameters import set_file as parameter_set
 from backend.tools.parameters import without
 from drivers.errors import NotAllowed
+from drivers.texts.message import language
+from drivers.texts.profile_words import ProfileWords
 from profiles.schema import Raw
 
 
@@ -21,7 +23,7 @@ def print_missing(data: bytes) -> None:
     """Print on standard error which settings are missing in a new set."""
     missing = without(parameter_set.parse(data).not_read)
     if missing:
-        typer.echo(f"the set is{missing}", err=True)
+        note("printed.set-is", missing=missing)
 
 
 class Described(Protocol):
@@ -137,27 +139,29 @@ def assignment(find: Callable[[str], D], text: str) -> tuple[D, Raw]:
         return parameter, finite(parameter.key, parameter.name, value)
 
 
-def line(parameter: Described, reported: Reported) -> str:
-    """A parameter and its value as a line of text."""
+def line(parameter: Described, reported: Reported, family: str) -> str:
+    """A parameter of this drive family and its value as a line of text."""
+    say = ProfileWords(family, language())
+    name = say(parameter.name)
     if reported.raw is None:
-        return (
-            f"{parameter.key}  {parameter.name}: {reported.error or words_of('printed.not-read')}"
-        )
-    label = _label(parameter, reported)
+        return f"{parameter.key}  {name}: {reported.error or words_of('printed.not-read')}"
+    label = say(_label(parameter, reported))
     shown = _in_unit(reported.raw, reported.value, parameter.unit)
     if parameter.bits and isinstance(reported.raw, int):
         shown = f"{reported.raw} ({reported.raw & _WIDEST:#06x})"
-    return f"{parameter.key}  {parameter.name} = {shown}" + (f" ({label})" if label else "")
+    return f"{parameter.key}  {name} = {shown}" + (f" ({label})" if label else "")
 
 
-def show_readings(read: Iterable[tuple[Described, Reported]], *, as_json: bool) -> bool:
+def show_readings(
+    read: Iterable[tuple[Described, Reported]], family: str, *, as_json: bool
+) -> bool:
     """Print parameters with their values; return whether each has one."""
     rows = list(read)
     if as_json:
         print(json.dumps([_row(parameter, reported) for parameter, reported in rows], indent=1))
     else:
         for parameter, reported in rows:
-            print(line(parameter, reported))
+            print(line(parameter, reported, family))
     return all(reported.raw is not None for _, reported in rows)
 
 
@@ -179,7 +183,7 @@ def _label(parameter: Described, reported: Reported) -> str:
 
 def _in_unit(raw: Raw | None, value: Raw | None, unit: str) -> str:
     if raw is None:
-        return "none"
+        return words_of("limit.none")
     return f"{value} {unit}".rstrip() + (f"  [raw {raw}]" if raw != value else "")
 
 
@@ -202,29 +206,31 @@ def other_family(file: str, theirs: str, drive: str, ours: str) -> NotAllowed:
     return NotAllowed("command.drive", drive=drive, file=file, theirs=theirs, ours=ours)
 
 
-def show(rows: Iterable[Compared], *, as_json: bool = False) -> None:
+def show(rows: Iterable[Compared], family: str, *, as_json: bool = False) -> None:
     """Print a comparison."""
     if as_json:
         print(json.dumps([row._asdict() for row in rows], indent=1))
         return
+    say = ProfileWords(family, language())
     for row in rows:
+        name = say(row.name)
         if row.differs:
             ours = _in_unit(row.drive_raw, row.drive_value, row.unit)
             theirs = _in_unit(row.file_raw, row.file_value, row.unit)
-            print_text("printed.value-differs", key=row.key, name=row.name, drive=ours, file=theirs)
+            print_text("printed.value-differs", key=row.key, name=name, drive=ours, file=theirs)
         else:
             status = words_of(_STATUS[row.status])
-            print(f"{row.key}  {row.name}: {status}" + (f" {row.problem}" if row.problem else ""))
+            print(f"{row.key}  {name}: {status}" + (f" {row.problem}" if row.problem else ""))
 
 
-def chosen(rows: Iterable[Compared], *, yes: bool) -> list[str]:
+def chosen(rows: Iterable[Compared], family: str, *, yes: bool) -> list[str]:
     """Show the differences, ask for confirmation and return the keys to write; may be empty.
 
     Raises:
         NotAllowed: the person declined.
     """
     rows = list(rows)
-    show(rows)
+    show(rows, family)
     keys = [row.key for row in rows if row.selected]
     if not keys:
         print_text("printed.nothing-to-write")

@@ -25,7 +25,7 @@ from backend.commands.measuring.tools import command_of, lines_of
 from backend.commands.server.keep import Config, Database, station_records
 from backend.health.compare import CHECKS, LEAST_REPEATS
 from backend.health.records import HealthRecords
-from backend.tools.health.result import UNITS, HealthResult
+from backend.tools.health.result import UNITS, HealthResult, Quantity
 from backend.tools.registry import BY_KIND
 from backend.tools.wire_message import MessageInfo
 from drivers.errors import NotAllowed
@@ -245,6 +245,10 @@ def _finding(each: HealthFinding) -> list[str]:
     return lines
 
 
+def _quantity(quantity: Quantity) -> str:
+    return text(f"health.{quantity.replace('_', '-')}").words(language())
+
+
 def _trend_lines(found: AxisHealth) -> list[str]:
     serial = ""
     if found.serial is not None:
@@ -252,7 +256,7 @@ def _trend_lines(found: AxisHealth) -> list[str]:
     lines = [f"{found.axis}  {found.profile}{serial}"]
     for row in found.runs:
         values = "  ".join(
-            f"{each.quantity} {each.number}: {each.value:.4g} {UNITS[each.quantity]}"
+            f"{_quantity(each.quantity)} {each.number}: {each.value:.4g} {UNITS[each.quantity]}"
             for each in row.values
         )
         lines.append(f"  {row.taken:%Y-%m-%d %H:%M}  #{row.id:<6} {values}")

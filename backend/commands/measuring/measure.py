@@ -21,6 +21,7 @@ from backend.commands.base.session import drive_and_pending, drive_on, opened, r
 from backend.store.files import StorageFailed, require_writable, write_atomically
 from backend.tools.tool import ToolSettings
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 
 Answer = Mapping[str, object]
 Url = Annotated[str | None, typer.Argument(metavar="[BUS_URL]")]
@@ -55,7 +56,7 @@ async def exchanging(
         await session.start(cycle_ms / 1e3)
         axis.session = session
         try:
-            with axis.granted("measurement from the command line", envelope):
+            with axis.granted(text("motion.purpose-command-line"), envelope):
                 async with (
                     profile_speed.prepared(axis, session, envelope, consent)
                     if closes_loops
@@ -96,7 +97,7 @@ async def exchanging_pair(
         held.push_async_callback(session.stop)
         for axis in axes:
             axis.session = session
-            held.enter_context(axis.granted("measurement from the command line", settings.envelope))
+            held.enter_context(axis.granted(text("motion.purpose-command-line"), settings.envelope))
             await held.enter_async_context(
                 profile_speed.prepared(axis, session, settings.envelope, settings.consent)
             )

@@ -14,7 +14,7 @@ from backend.commands.base.session import run
 from backend.commands.base.state import state_folder
 from backend.people.accounts import Accounts
 from backend.people.records import Account
-from backend.people.rights import Right, Role
+from backend.people.rights import Right, Role, role_text
 from backend.people.station import People
 from drivers.errors import NotAllowed
 
@@ -63,7 +63,7 @@ def list_accounts(config: Config = None) -> None:
     async def work(accounts: Accounts) -> None:
         for each in accounts.directory.all():
             here = len(accounts.directory.sessions(each.id))
-            print_text("printed.account", name=each.name, role=each.role, sessions=here)
+            print_text("printed.account", name=each.name, role=role_text(each.role), sessions=here)
 
     _with(config, work)
 
@@ -79,7 +79,7 @@ def add(
 
     async def work(accounts: Accounts) -> None:
         made = await accounts.add(name, password, role)
-        print_text("printed.account-made", name=made.name, role=made.role)
+        print_text("printed.account-made", name=made.name, role=role_text(made.role))
 
     _with(config, work)
 
@@ -101,7 +101,7 @@ def set_role(name: Name, role: Role, config: Config = None) -> None:
 
     async def work(accounts: Accounts) -> None:
         await accounts.set_role(_find(accounts, name).id, role)
-        print_text("printed.account-role", name=name, role=role)
+        print_text("printed.account-role", name=name, role=role_text(role))
 
     _with(config, work)
 

@@ -105,9 +105,9 @@ def demo(
                 for axis, what in drives.planted:
                     print_text("printed.planted-defect", axis=axis, defect=what)
                 for url, real in drives.addresses.items():
-                    print_text("printed.wire-is", url=url, real=str(real))
+                    print_text("printed.wire-is", url=url, real=real)
                 for problem in drives.problems:
-                    print_text("printed.note-beside", words=str(problem))
+                    print_text("printed.note-beside", words=problem)
                 server_bench = Bench(
                     state, drives.wires, database=database, blobs=blobs, names=drives.names
                 )

@@ -26,6 +26,7 @@ from backend.library.backup.copy import copy_rows
 from backend.store.database import FILE, Store
 from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
+from drivers.texts.message import Text, text
 from profiles.replacing import move_into_place
 
 FORMAT = "servodeck backup"
@@ -213,17 +214,17 @@ def read_manifest(archive: zipfile.ZipFile, shown: str) -> dict[str, Part]:
             for name, part in content["parts"].items()
         }
     except (KeyError, ValueError, TypeError, AttributeError, zipfile.BadZipFile) as error:
-        raise _bad(shown, f"it has no usable manifest ({error})") from error
+        raise _bad(shown, text("store.backup-manifest", cause=str(error))) from error
     if kind != FORMAT:
-        raise _bad(shown, "it is something else")
+        raise _bad(shown, text("store.backup-other"))
     if version > VERSION:
-        raise _bad(shown, "a newer servodeck made it")
+        raise _bad(shown, text("store.backup-newer"))
     names = [info.filename for info in archive.infolist()]
     if sorted(names) != sorted([*parts, MANIFEST]):
-        raise _bad(shown, "it does not contain what its manifest lists")
+        raise _bad(shown, text("store.backup-contents"))
     for info in archive.infolist():
         if info.filename != MANIFEST and not _is_safe(info):
-            raise _bad(shown, f"{info.filename!r} is no name that a backup contains")
+            raise _bad(shown, text("store.backup-name", part=info.filename))
     return parts
 
 
@@ -258,9 +259,9 @@ def unpack(archive: zipfile.ZipFile, parts: dict[str, Part], folder: Path, shown
                 path.chmod(0o600)
                 same = _copy_checked(source, target, part)
         except (zipfile.BadZipFile, EOFError, NotImplementedError) as error:
-            raise _bad(shown, f"{name} is damaged ({error})") from error
+            raise _bad(shown, text("store.backup-damaged", part=name, cause=str(error))) from error
         if not same:
-            raise _bad(shown, f"{name} is not what was saved")
+            raise _bad(shown, text("store.backup-part-differs", part=name))
 
 
 def _copy_checked(source: IO[bytes], target: BinaryIO, part: Part) -> bool:
@@ -276,5 +277,5 @@ def _copy_checked(source: IO[bytes], target: BinaryIO, part: Part) -> bool:
     return size == part.bytes and digest.hexdigest() == part.sha256
 
 
-def _bad(shown: str, why: str) -> BackupFailed:
+def _bad(shown: str, why: Text) -> BackupFailed:
     return BackupFailed("store.cannot-restored-nothing-changed", value=shown, why=why)

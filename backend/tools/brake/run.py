@@ -202,7 +202,7 @@ def _cannot(
 @asynccontextmanager
 async def _closed(axis: Axis, settings: BrakeSettings) -> AsyncIterator[None]:
     """Hold the grant of the test, block forcing of outputs meanwhile, and keep the brake closed."""
-    purpose = "brake test"
+    purpose = text("motion.purpose-brake-test")
     with contextlib.ExitStack() as stack:
         if keys := forcing_keys(axis.drive):
             stack.enter_context(axis.granted(purpose, keys=keys))

@@ -209,7 +209,7 @@ async def _without_loops(axis: Axis, settings: FirstPowerSettings) -> AsyncItera
     options = [key for key in _COASTING if key in drive.profile.by_key]
     present = await existing(drive, tuple(options))
     limits = await torque_limits(drive)
-    with axis.granted("first power", settings.envelope):
+    with axis.granted(text("motion.purpose-first-power"), settings.envelope):
         async with axis.restoring(*present, *limits):
             await axis.limit_torque(limits, settings.torque_limit)
             for key in present:

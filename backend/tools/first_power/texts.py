@@ -90,8 +90,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "分辨率：每圈 {value} 个增量。",
     ),
     "resolution.uncertain": (
-        "Resolution: what an increment is, is not certain. State the scales on the Setup page.",
-        "分辨率：增量的含义不确定。请在设置页面声明标度。",
+        "Resolution: what an increment is, is not certain. State the scales on the Overview page.",
+        "分辨率：增量的含义不确定。请在“概览”页面声明标度。",
     ),
     "counts.ok": (
         "Counts: {value} rev were counted for the marked turn.",

@@ -9,6 +9,7 @@ from backend.tools.thresholds import measuring_restore as threshold
 from backend.work.jobs import JobResult
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
+from drivers.texts.message import text
 from profiles.schema import Raw
 
 
@@ -39,6 +40,6 @@ async def settle(axis: Axis, *, asked: bool) -> JobResult:
             back[entry.key] = entry.raw
         else:
             left[entry.key] = f"{now} now, which no measurement left there"
-    with axis.granted("put back what a motion left"):
+    with axis.granted(text("motion.purpose-restore")):
         await put_back_in_time(axis, back)
     return {"back": dict(back), "left": dict(left)}

@@ -14,7 +14,7 @@ from backend.tools.thresholds import moves_procedures as threshold
 from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
-from drivers.texts.message import Text, text
+from drivers.texts.message import Text, joined, profile_text, text
 from profiles.schema import (
     ConfirmStep,
     PollStep,
@@ -61,21 +61,24 @@ async def run_procedure(
         DriveError: a step failed; states which, and that later steps were not carried out.
     """
     drive = axis.drive
+    family = drive.profile.drive
     texts = [step.text for step in procedure.steps if isinstance(step, ConfirmStep)]
     if texts and not confirmed:
         raise NotAllowed(
             "moves.needs-your-agreement",
             drive=drive.name,
-            procedure_title=procedure.title,
-            texts=" ".join(texts),
+            procedure_title=profile_text(family, procedure.title),
+            texts=joined((profile_text(family, each) for each in texts), " "),
         )
     if procedure.requires_stop and await axis.state() is State.OPERATION_ENABLED:
         raise NotAllowed(
-            "moves.possible-motor-not-enabled", drive=drive.name, procedure_title=procedure.title
+            "moves.possible-motor-not-enabled",
+            drive=drive.name,
+            procedure_title=profile_text(family, procedure.title),
         )
     described = describe(procedure)
     moves = any(_energises(drive, step) for step in procedure.steps)
-    with axis.granted(procedure.title) if moves else nullcontext():
+    with axis.granted(profile_text(family, procedure.title)) if moves else nullcontext():
         await _carry_out(axis, procedure, described, progress)
     _remember(axis, procedure.name)
     return {

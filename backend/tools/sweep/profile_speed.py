@@ -27,6 +27,7 @@ from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, exceeded
 from drivers.halt import HaltCause
 from drivers.link import Link
+from drivers.texts.message import text
 
 #: Bit 8 of DS_C's status word (003:305).
 _HOMED = 1 << 8
@@ -108,7 +109,7 @@ async def prepared(
     ramps = [drive.require("profile_acceleration"), drive.require("profile_deceleration")]
     limits = list(await existing(drive, [drive.key("max_torque")]))
     modes = await axis.restorable_mode()
-    with axis.granted("measurement by speed", envelope):
+    with axis.granted(text("motion.purpose-profile-velocity"), envelope):
         async with axis.restoring(*ramps, *limits, *modes):
             await _prepare(axis, session, envelope, modes, ramps, limits)
             yield

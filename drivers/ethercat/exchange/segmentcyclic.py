@@ -414,7 +414,7 @@ class EthercatCyclic:
 
     def _raise_if_halted(self, station: int) -> None:
         if (halt := self.axis_state(station).halted) is not None:
-            raise motion_halted(f"station {station}", halt)
+            raise motion_halted(text("link.station", station=station), halt)
 
     def _check_names(self, signals: Sequence[CyclicSignal]) -> None:
         names = [signal.channel for signal in signals]

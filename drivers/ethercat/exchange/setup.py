@@ -302,12 +302,6 @@ def _watch_outputs() -> Steps[int]:
     return watching
 
 
-_NOT_MOVED = (
-    "it can be read and written, but not moved through cyclic data;"
-    " its maker has an EEPROM file for it"
-)
-
-
 class FoundInPart(ProtocolError):
     """The EEPROM states more than the search learned: one of its frames was lost or late."""
 

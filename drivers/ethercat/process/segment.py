@@ -40,12 +40,11 @@ from drivers.ethercat.process.library_wire import LibraryWire
 from drivers.ethercat.wire import frames
 from drivers.ethercat.wire.steps import Read, Write
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import Text, joined, text
 
 IO_MAP_BYTES = 4096
 MAX_STATIONS = 199
 _NAME_LIMIT = 15
-_EMERGENCY = "an emergency or another unexpected mail came in between"
 _FRAME_TIMEOUT_US, _IDLE_FRAME_TIMEOUT_US = 2000, 10_000
 """Without and with process data: time-out of a frame [µs].
 
@@ -350,9 +349,10 @@ class Segment:
             self.forget_errors()
             if self._library is not None:
                 self._library.require_probes()
-            reported = sorted({_mapping_error(item) for item in error.error_list})
+            reported = {str(why): why for why in map(_mapping_error, error.error_list)}
             raise InvalidMap(
-                "ethercat.process-data-not-mapped", reported="; ".join(reported)
+                "ethercat.process-data-not-mapped",
+                reported=joined(reported[each] for each in sorted(reported)),
             ) from error
         self.mapped = True
 
@@ -447,13 +447,12 @@ def _lock(interface: str) -> socket.socket | BinaryIO:
         raise Busy("ethercat.another-servodeck-already-uses", interface=interface) from error
 
 
-def _mapping_error(item: Exception) -> str:
+def _mapping_error(item: Exception) -> Text:
     if isinstance(item, pysoem.SdoError):
-        return (
-            f"station {item.slave_pos} aborted {item.index:04X}:{item.subindex:02X} ({item.desc})"
+        address = f"{item.index:04X}:{item.subindex:02X}"
+        return text(
+            "ethercat.map-aborted", station=item.slave_pos, object=address, cause=str(item.desc)
         )
-    if isinstance(item, pysoem.MailboxError):
-        return f"station {item.slave_pos}: {item.desc}"
-    if isinstance(item, pysoem.PacketError):
-        return f"station {item.slave_pos}: {item.desc}"
-    return _EMERGENCY
+    if isinstance(item, pysoem.MailboxError | pysoem.PacketError):
+        return text("ethercat.map-failed", station=item.slave_pos, cause=str(item.desc))
+    return text("ethercat.map-unexpected-mail")

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+from drivers.texts.message import Unsuitable, text
 from drivers.virtual.device import Device
 from drivers.virtual.firmware import families
 from drivers.virtual.firmware.motion.load_encoder import without_load_encoder
@@ -43,7 +44,7 @@ def make_device(
         _require_whole_bytes(profile)
         name = "generic402"
     if name not in known:
-        raise ValueError(f"no virtual {profile.drive!r}; there are: {', '.join(known)}")
+        raise Unsuitable(text("mechanics.no-virtual", drive=profile.drive, known=", ".join(known)))
     family = families.family_of(profile, name)
     if mechanics is None:
         mechanics = standard_mechanics()
@@ -72,15 +73,19 @@ _RATES = re.compile(r"inc/s²?|(0\.\d+ )?rpm(/s)?")
 def _require_known_units(profile: Profile) -> None:
     """Raise ValueError if the file states units that this firmware does not support."""
     units = profile.units
-    for quantity, text, known in (
-        ("positions", units.position, _POSITIONS),
-        ("speeds", units.velocity, _RATES),
-        ("accelerations", units.acceleration, _RATES),
+    for quantity, unit, known in (
+        ("position", units.position, _POSITIONS),
+        ("velocity", units.velocity, _RATES),
+        ("acceleration", units.acceleration, _RATES),
     ):
-        if known.fullmatch(text) is None:
-            raise ValueError(
-                f"no virtual {profile.drive!r}: its {quantity} are in {text!r}; a virtual drive "
-                "has increments and rpm, with or without a power of ten"
+        if known.fullmatch(unit) is None:
+            raise Unsuitable(
+                text(
+                    "mechanics.no-virtual-units",
+                    drive=profile.drive,
+                    quantity=quantity,
+                    unit=unit,
+                )
             )
 
 
@@ -88,9 +93,8 @@ def _require_whole_bytes(profile: Profile) -> None:
     """Raise ValueError if process data contain single bits, which this firmware cannot map."""
     for pdo in profile.pdo.sets if profile.pdo is not None else ():
         if any(part.bits % 8 for part in pdo.layout):
-            raise ValueError(
-                f"no virtual {profile.drive!r}: its PDO {pdo.index:04X}h holds single bits, which "
-                "a virtual drive does not map"
+            raise Unsuitable(
+                text("mechanics.no-virtual-bits", drive=profile.drive, index=pdo.index)
             )
 
 

@@ -12,6 +12,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from drivers.texts.message import Unsuitable, text
 from drivers.virtual.mechanics.load_encoder import LoadEncoderSpec
 from drivers.virtual.mechanics.rough import RoughTorqueSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
@@ -148,10 +149,7 @@ class TravelSpec(_Part):
     @model_validator(mode="after")
     def _in_order(self) -> TravelSpec:
         if not (self.min_rev < self.max_rev and self.min_rev <= 0 <= self.max_rev):
-            raise ValueError(
-                f"travel: the start position 0 must lie between min_rev {self.min_rev} and "
-                f"max_rev {self.max_rev}, and there must be room between them"
-            )
+            raise Unsuitable(text("mechanics.travel-order", low=self.min_rev, high=self.max_rev))
         return self
 
 
@@ -172,14 +170,10 @@ class SwitchSpec(_Part):
     def _in_order(self) -> SwitchSpec:
         low, high = self.negative_limit_rev, self.positive_limit_rev
         if low is not None and high is not None and not low < high:
-            raise ValueError(
-                f"switches: negative_limit_rev {low} must lie below positive_limit_rev {high}"
-            )
+            raise Unsuitable(text("mechanics.switch-order", low=low, high=high))
         if not self.home_from_rev < self.home_to_rev:
-            raise ValueError(
-                f"switches: the home cam must begin before it ends: home_from_rev "
-                f"{self.home_from_rev}, home_to_rev {self.home_to_rev}"
-            )
+            begin, end = self.home_from_rev, self.home_to_rev
+            raise Unsuitable(text("mechanics.home-cam", begin=begin, end=end))
         return self
 
 
@@ -230,7 +224,7 @@ class MechanicsSpec(_Part):
     @model_validator(mode="after")
     def _backlash_count(self) -> MechanicsSpec:
         if sum(load.backlash_rad > 0 for load in self.load) > 3:
-            raise ValueError("load: at most three couplings of a chain may have backlash")
+            raise Unsuitable(text("mechanics.backlash-count"))
         return self
 
     @model_validator(mode="after")
@@ -243,12 +237,14 @@ class MechanicsSpec(_Part):
         reached = math.sin(2 * math.pi * min(furthest / place.period_rev, 0.25))
         pull_nm = abs(self.friction.gravity_nm) + abs(place.torque_nm) * reached
         if pull_nm > most_nm:
-            raise ValueError(
-                f"friction: gravity_nm {self.friction.gravity_nm:g}"
-                + (f" with torque_nm {place.torque_nm:g} of place" if place.torque_nm else "")
-                + f" is more than this motor holds even for a moment ({_PEAK_PER_RATED:g} times "
-                f"rated_torque_nm: {most_nm:g} Nm); torques are those at the motor shaft, behind "
-                "the gear"
+            raise Unsuitable(
+                text(
+                    "mechanics.cannot-hold-place" if place.torque_nm else "mechanics.cannot-hold",
+                    gravity_nm=self.friction.gravity_nm,
+                    torque_nm=place.torque_nm,
+                    peak=_PEAK_PER_RATED,
+                    most_nm=most_nm,
+                )
             )
         return self
 
@@ -256,15 +252,17 @@ class MechanicsSpec(_Part):
     def _switches_can_be_reached(self) -> MechanicsSpec:
         low, high = self.limit_switches_rev
         if not low < high:
-            raise ValueError(
-                f"switches: the negative limit switch at {low:g} and the positive one at {high:g} "
-                "revolutions leave no room between them"
-            )
+            raise Unsuitable(text("mechanics.switch-room", low=low, high=high))
         for name, place in (("negative_limit_rev", low), ("positive_limit_rev", high)):
             if not self.travel.min_rev <= place <= self.travel.max_rev:
-                raise ValueError(
-                    f"switches: {name} {place:g} lies beyond the end stops "
-                    f"({self.travel.min_rev:g} to {self.travel.max_rev:g}) and would never trip"
+                raise Unsuitable(
+                    text(
+                        "mechanics.switch-beyond-stops",
+                        name=name,
+                        place=place,
+                        low=self.travel.min_rev,
+                        high=self.travel.max_rev,
+                    )
                 )
         return self
 

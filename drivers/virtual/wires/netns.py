@@ -29,6 +29,7 @@ from drivers.computer.namespaces import (
     leave_namespaces,
 )
 from drivers.computer.sockets import AF_NETLINK, NETLINK_ROUTE
+from drivers.texts.message import Unsuitable, prose, text
 
 _RTM_NEWLINK = 16
 _REQUEST, _ACK, _EXCLUSIVE, _CREATE = 0x01, 0x04, 0x200, 0x400
@@ -38,15 +39,10 @@ _ADDR_GEN_MODE, _ADDR_GEN_NONE = 8, 1
 _UP = 0x1
 _NESTED = 0x8000
 
-_REMEDY = (
-    "allow unprivileged user namespaces (sysctl kernel.unprivileged_userns_clone=1 or "
-    "kernel.apparmor_restrict_unprivileged_userns=0; in a container, its security profile), or "
-    "run as root"
-)
 _KEEP_TIME = ("drivers.virtual.", "drivers.ethercat.process")
 
 
-class NamespaceUnavailable(Exception):
+class NamespaceUnavailable(Unsuitable):
     """The system forbids namespaces; the message states the cause and the remedies."""
 
 
@@ -74,7 +70,7 @@ class Namespace:
             NamespaceUnavailable: with the cause and the remedies.
         """
         if not AVAILABLE:
-            raise NamespaceUnavailable("virtual EtherCAT cables need Linux network namespaces")
+            raise NamespaceUnavailable(text("virtual.cables-need-linux"))
         for name in (name for pair in pairs for name in pair):
             if not 0 < len(name.encode()) <= 15:
                 raise ValueError(f"interface name {name!r} must have 1 to 15 bytes")
@@ -91,8 +87,8 @@ class Namespace:
         if answer != "ready":
             namespace = cls(holder, ())
             namespace.close()
-            reason = answer or "the helper process ended without a word"
-            raise NamespaceUnavailable(f"no private network here: {reason}. Remedy: {_REMEDY}")
+            reason = prose(answer) if answer else text("virtual.process-ended")
+            raise NamespaceUnavailable(text("virtual.no-private-network", reason=reason))
         return cls(holder, tuple(pairs))
 
     @property
@@ -144,7 +140,8 @@ def enter(pid: int) -> None:
         enter_namespaces(pid)
     except OSError as error:
         reason = f"{error.filename}: {error.strerror}"
-        raise NamespaceUnavailable(f"cannot join the namespaces of {pid}: {reason}") from error
+        why = text("virtual.cannot-join-namespaces", pid=pid, cause=reason)
+        raise NamespaceUnavailable(why) from error
 
 
 def _python() -> list[str]:

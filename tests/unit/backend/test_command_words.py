@@ -13,6 +13,7 @@ from backend import cli
 from backend.commands.buses import eeprom
 from backend.commands.measuring import health, response
 from backend.commands.server import preflight
+from backend.tools.health.result import QUANTITIES, HealthValue
 from drivers.computer.lateness import Histogram
 from drivers.texts.answers import sentences
 from drivers.texts.message import prose, speaking
@@ -115,6 +116,14 @@ def test_lines_of_health() -> None:
     with speaking("zh"):
         assert "由 Ada 于 2026-03-04 05:06 UTC 签署" in health._baseline_lines(found)[0]
         assert health._trend_lines(found) == ["X  mms7  序列号 1234567"]
+    values = [HealthValue(quantity=each, value=50.25) for each in QUANTITIES]
+    found.runs = [SimpleNamespace(id=7, taken=dt.datetime(2026, 3, 4, 5, 6), values=values)]
+    assert "resonance 1: 50.25 Hz" in health._trend_lines(found)[1]
+    assert "rise time of the step 1: 50.25 s" in health._trend_lines(found)[1]
+    with speaking("zh"):
+        row = health._trend_lines(found)[1]
+    assert "谐振 1: 50.25 Hz" in row
+    assert "step_rise" not in row
 
 
 def test_names_of_measured_times(capsys: pytest.CaptureFixture[str]) -> None:

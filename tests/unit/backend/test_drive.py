@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from backend.api.drive.models_parameters import ParameterWrite
 from backend.drive.drive import Drive
 from backend.drive.ports import Port
+from backend.drive.value_check import checked
 from backend.tools.parameters import read_all
 from drivers.errors import (
     DriveError,
@@ -23,6 +24,7 @@ from drivers.errors import (
     Rejected,
 )
 from drivers.link import Address
+from drivers.texts.message import Text
 from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
@@ -67,6 +69,25 @@ async def test_bad_values_never_reach_the_bus(
     assert not link.written
     for word in words:
         assert word in str(caught.value)
+
+
+def test_a_refusal_in_chinese_names_parameter_and_values_in_chinese() -> None:
+    mode, bandwidth = (load_profile("mms7").by_key[key] for key in ("2005:10", "2005:03"))
+    with pytest.raises(OutOfRange) as caught:
+        checked("X axis", "mms7", mode, 9)
+    assert "Second gain adjustment mode: 9 is not one of its values: 0 (manual)" in str(
+        caught.value
+    )
+    said = caught.value.text.words("zh")
+    for english in ("manual", "stiffness", mode.name):
+        assert english not in said
+    assert "0（手动）" in said
+    assert "2005:10 第二增益调整模式" in said
+    assert caught.value.text == Text.from_wire(caught.value.text.to_wire())
+    with pytest.raises(OutOfRange) as caught:
+        checked("X axis", "mms7", bandwidth, 70000)
+    assert "原始值" in caught.value.text.words("zh")
+    assert " to " not in caught.value.text.words("zh")
 
 
 async def test_set_at_stop_is_refused_while_enabled(drive: Drive, link: MemoryLink) -> None:

@@ -72,3 +72,12 @@ def test_the_doctor_gives_scripts_an_empty_list_then(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(session, "link_for", lambda _url: _Bus())
     done = CliRunner().invoke(cli.app, ["doctor", "canopen://socketcan/can9", "--json"])
     assert (done.exit_code, done.stdout.strip()) == (1, "[]")
+
+
+def test_a_device_that_is_no_drive_is_named_beside_the_json(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(session, "link_for", lambda _url: _Bus(5))
+    done = CliRunner().invoke(cli.app, ["doctor", "canopen://socketcan/can9", "--json"])
+    assert (done.exit_code, done.stdout.strip()) == (0, "[]")
+    assert "no servo drive" in done.stderr

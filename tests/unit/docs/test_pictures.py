@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import json
 import sys
 from collections.abc import Callable
+from datetime import UTC, datetime
 from pathlib import Path
 from types import ModuleType
 
@@ -27,6 +29,21 @@ def module(folder: str, name: str) -> ModuleType:
         return importlib.import_module(name)
     finally:
         sys.path.remove(str(FOLDERS / folder))
+
+
+def program() -> ModuleType:
+    """The program that makes the pictures, whose file has the name of every program."""
+    file = FOLDERS / "pictures" / "__main__.py"
+    spec = importlib.util.spec_from_file_location("pictures_program", file)
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = importlib.util.module_from_spec(spec)
+    sys.path.insert(0, str(file.parent))
+    try:
+        spec.loader.exec_module(loaded)
+    finally:
+        sys.path.remove(str(file.parent))
+    return loaded
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +104,37 @@ def test_what_is_not_of_the_run(
     findings = [finding.text for finding in pictures.findings()]
     assert len(findings) == 1, findings
     assert found in findings[0]
+
+
+def test_a_chinese_page_shows_the_chinese_page(pictures: ModuleType, docs: Path) -> None:
+    """Also where the English recording is there and the Chinese one was never made."""
+    (docs / "zh").mkdir()
+    page = docs / "zh" / "page.md"
+    page.write_text("![阶跃](../images/step.webp)\n", "utf-8")
+    (found,) = pictures.findings()
+    assert (found.file, found.line) == (page, 1)
+    assert "step.webp shows the English page" in found.text
+    page.write_text("![阶跃](../images/step-zh.webp)\n", "utf-8")
+    assert [one.text for one in pictures.prose.missing_pictures()] == [
+        "there is no picture ../images/step-zh.webp"
+    ]
+
+
+def test_some_chapters_replace_their_pictures_alone(
+    pictures: ModuleType, docs: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    made = tmp_path_factory.mktemp("made")
+    (made / "jog-zh.webp").write_bytes(b"abc")
+    (docs / "zh").mkdir()
+    (docs / "zh" / "page.md").write_text("![点动](../images/jog-zh.webp)\n", "utf-8")
+    assert [one.text for one in pictures.findings()] == []  # `missing_pictures` tells it
+    assert list(pictures.prose.missing_pictures())
+    run = program().publish_part(made, datetime.now(UTC), ["jog"])
+    assert run.id == "r1"
+    assert run.pictures == {"step.webp": ABC, "jog-zh.webp": ABC}
+    assert list(pictures.findings()) == list(pictures.prose.missing_pictures()) == []
+    (docs / "images" / "jog-zh.webp").write_bytes(b"of another run")
+    assert "not the picture that" in next(pictures.findings()).text
 
 
 def test_a_run_writes_its_figures_into_the_pages(pictures: ModuleType, docs: Path) -> None:

@@ -124,3 +124,12 @@ def test_missing_pictures(prose: ModuleType, pages: Path) -> None:
     (pages / "there.png").write_bytes(b"")
     (pages / "page.md").write_text("![a](there.png)\n\n![b](gone.png)\n", "utf-8")
     assert [finding.line for finding in prose.missing_pictures()] == [3]
+
+
+def test_notes_of_chinese_pages_have_chinese_titles(prose: ModuleType, pages: Path) -> None:
+    (pages / "zh").mkdir()
+    (pages / "page.md").write_text("!!! warning\n    Text.\n", "utf-8")
+    (pages / "zh" / "page.md").write_text(
+        '!!! warning "警告：轴"\n    文字。\n\n!!! danger\n    文字。\n', "utf-8"
+    )
+    assert [(one.file.parent.name, one.line) for one in prose.english_titles()] == [("zh", 4)]

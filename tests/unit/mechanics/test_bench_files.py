@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 
+from backend.commands.buses.virtual import _one_drive
 from drivers.errors import NotAllowed
+from drivers.texts.validation import reason_of
 from drivers.virtual.bench import load_bench
 from drivers.virtual.firmware.factory import make_device, number_device
 from drivers.virtual.mechanics.spec import (
@@ -55,6 +59,20 @@ def test_ports_that_a_drive_does_not_have(
     assert says in refused(tmp_path, AXIS.format(name="X", drive=drive, on=on, station=station))
 
 
+def test_the_error_of_one_drive_has_no_file_and_is_chinese_in_chinese(tmp_path: Path) -> None:
+    """`servodeck virtual` writes a bench file of its own, which nobody knows."""
+    file = tmp_path / "bench.toml"
+    file.write_text(AXIS.format(name="X", drive="m6l", on="mlink://virtual0", station=1), "utf-8")
+    with pytest.raises(NotAllowed) as caught:
+        _one_drive(file, tmp_path, None)
+    assert "没有 mlink 端口" in caught.value.text.words("zh")
+    assert str(tmp_path) not in caught.value.text.words("zh")
+    assert caught.value.text.words().endswith("has no mlink port")
+    remedy = caught.value.remedy_text
+    assert remedy is not None
+    assert remedy.words("zh") == "请接到 ethercat"
+
+
 def test_two_axes_of_one_name_would_be_one_machine(tmp_path: Path) -> None:
     text = "".join(
         AXIS.format(name="X", drive="mms7", on="mlink://virtual0", station=n) for n in (1, 2)
@@ -97,8 +115,10 @@ def test_impossible_machines_are_refused(parts: dict[str, object], says: str) ->
     motor = parts.pop("motor", {})
     assert isinstance(motor, dict)
     table = {"motor": MOTOR.model_dump() | motor} | parts
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValidationError, match=says) as refused:
         MechanicsSpec.model_validate(table)
+    chinese = reason_of(refused.value.errors()[0]).words("zh")
+    assert re.search("[\u4e00-\u9fff]", chinese)
 
 
 def test_a_short_travel_keeps_its_switches_apart() -> None:

@@ -23,6 +23,7 @@ from drivers.motion.setpoint_plan import (
     Motion,
     Phase,
 )
+from drivers.texts.message import text
 
 OUT = {CONTROL: 0, POSITION: 1, VELOCITY: 2, TORQUE: 3, 0x60B2: 4}
 ENABLED, DISABLED, FAULT, FAULT_REACTION, QUICK_STOP = 0x0237, 0x0250, 0x0218, 0x021F, 0x0217
@@ -106,7 +107,7 @@ def test_a_limit_that_cannot_be_watched_is_named_in_the_readers_language(
 ) -> None:
     """The Chinese sentence had the English name of the limit in it."""
     with pytest.raises(NotAllowed) as refused:
-        limits.require_watched((), "station 1")
+        limits.require_watched((), text("link.station", station=1))
     assert f"station 1: {english} cannot be watched, 60" in refused.value.text.words()
     assert chinese in refused.value.text.words("zh")
 

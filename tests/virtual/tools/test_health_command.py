@@ -121,7 +121,10 @@ def test_from_a_measurement_to_a_change(axis: Axis, tmp_path: Path) -> None:
         assert not late["runs"]
     with speaking("zh"):
         reported = run("compare", "--config", str(tmp_path), code=3)
+        trend = run("trend", "--config", str(tmp_path))
     assert "联轴器" in reported
+    assert "谐振 1: 50.2 Hz" in trend
+    assert "resonance" not in trend
 
 
 def test_what_is_not_there_says_so(axis: Axis, tmp_path: Path) -> None:

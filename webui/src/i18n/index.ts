@@ -23,13 +23,13 @@ fetchTexts()
 
 /** Messages are shown in the server's words until their own are here. */
 function fetchTexts(): void {
-  load(language).then(
-    () => {
-      generation += 1
-      for (const listener of listeners) listener()
-    },
-    () => undefined, // offline: the server's words stay
-  )
+  load(language).then(textsCame, () => undefined) // offline: the server's words stay
+}
+
+/** Draw everything that shows messages again. */
+export function textsCame(): void {
+  generation += 1
+  for (const listener of listeners) listener()
 }
 
 // Screen readers and hyphenation go by this; index.html cannot know the stored language.

@@ -1,6 +1,6 @@
 import { beforeAll, describe, expect, it } from 'vitest'
 import { problemTitle, sayIn, type T, translate } from './index'
-import { formatted, load, words } from './message'
+import { fetchProfilesBy, formatted, keepProfile, load, words } from './message'
 
 beforeAll(async () => {
   await load('en')
@@ -51,6 +51,25 @@ describe('a message of the server', () => {
     }
     expect(words('en', both)).toBe('Tune: X')
     expect(words('zh', both)).toBe('整定：X')
+  })
+  it('names what a profile names, once its texts are here', () => {
+    const fault = {
+      code: 'station.fault',
+      params: {
+        kind: 'fault',
+        fault_code: 'x1',
+        fault_name: { code: '=', params: { profile: 'mms7', words: 'Over-current' } },
+      },
+    }
+    const wanted: string[] = []
+    fetchProfilesBy((profile) => wanted.push(profile))
+    expect(words('en', fault)).toContain('Over-current')
+    expect(wanted).toEqual([])
+    expect(words('zh', fault)).toContain('Over-current')
+    expect(wanted).toEqual(['mms7'])
+    keepProfile('mms7', new Map([['Over-current', '过电流']]))
+    expect(words('zh', fault)).toContain('过电流')
+    expect(words('zh', fault)).not.toContain('Over-current')
   })
   it('is what others said where it has no code, and what the server said where it is not known', () => {
     expect(words('zh', { code: '', params: { words: 'errno 5' } })).toBe('errno 5')

@@ -16,6 +16,8 @@ type Spoken = 'en' | 'zh'
 /** Codes of what is not in the catalogue: words of others, and messages one after the other. */
 const PROSE = ''
 const JOINED = '+'
+/** A name or help of a drive family's profile, by its English original. */
+const OF_PROFILE = '='
 const CHINESE_JOINTS: Record<string, string> = { '; ': '；', ': ': '：', ', ': '、', ' ': '' }
 
 /** Codes of files that earlier versions wrote; the server has the same list (`message.py`). */
@@ -24,6 +26,18 @@ const RENAMED: Record<string, string> = {
   'autotune.promise-not-kept': 'autotune.prediction-not-confirmed',
   'api-tuning.frequency-response': 'sweep.title',
   'api-tuning.tune': 'autotune.title',
+}
+
+/** The translated texts of profiles, and how those that a message needs are fetched. */
+const ofProfiles = new Map<string, ReadonlyMap<string, string>>()
+let fetchProfile: (profile: string) => void = () => undefined
+
+export function fetchProfilesBy(fetch: (profile: string) => void): void {
+  fetchProfile = fetch
+}
+
+export function keepProfile(profile: string, texts: ReadonlyMap<string, string>): void {
+  ofProfiles.set(profile, texts)
 }
 
 /** The server's own files, so that page, server and command line say the same. */
@@ -124,6 +138,10 @@ function bundle(room: string, language: Spoken): FluentBundle | undefined {
 export function words(language: Spoken, message: Message, otherwise?: string): string {
   const facts = message.params ?? {}
   if (message.code === PROSE) return fact(language, facts.words ?? null)
+  if (message.code === OF_PROFILE) {
+    const original = fact(language, facts.words ?? null)
+    return language === 'en' ? original : ofProfile(fact(language, facts.profile ?? null), original)
+  }
   if (message.code === JOINED) {
     const joint = typeof facts.joint === 'string' ? facts.joint : '; '
     return Object.entries(facts)
@@ -132,6 +150,13 @@ export function words(language: Spoken, message: Message, otherwise?: string): s
       .join(language === 'zh' ? (CHINESE_JOINTS[joint] ?? joint) : joint)
   }
   return pattern(language, message) ?? otherwise ?? bare(language, message)
+}
+
+/** English until the texts of the profile are here: they are fetched then. */
+function ofProfile(profile: string, original: string): string {
+  const texts = ofProfiles.get(profile)
+  if (!texts) fetchProfile(profile)
+  return texts?.get(original) ?? original
 }
 
 function pattern(language: Spoken, message: Message): string | undefined {

@@ -6,7 +6,13 @@ api-drive_commands-motion-axis-enabled = { $drive }: { $parameter } commands mot
     .remedy = use the Motion page, which sets limits and a dead-man timeout; or disable the axis
 api-drive_cyclic-exchange-not-run = { $drive }: the cyclic exchange does not run
     .remedy = start it on the Connect page
-api-drive_detail = { $shape } in { $mode }: { $member_drive }
+api-drive_detail = { $shape ->
+    [step] step
+    [ramp] ramp
+    [trapezoid] trapezoid
+    [sine] sine
+   *[chirp] chirp
+ } in { $mode }: { $member_drive }
 api-drive_fault-reset = Fault reset
 api-drive_give-either-raw-value = { $drive }: { $parameter }: give either raw or value
     .remedy = send exactly one of the two

@@ -6,7 +6,13 @@ api-drive_commands-motion-axis-enabled = { $drive }：{ $parameter } 用于指�
     .remedy = 请使用“运动”页面，其中设有限值和失效保护超时；或断使能
 api-drive_cyclic-exchange-not-run = { $drive }：周期通信未运行
     .remedy = 请在“连接”页面启动
-api-drive_detail = { $mode } 中的 { $shape }：{ $member_drive }
+api-drive_detail = { $mode } 模式下的{ $shape ->
+    [step] 阶跃
+    [ramp] 斜坡
+    [trapezoid] 梯形
+    [sine] 正弦
+   *[chirp] 扫频信号
+ }：{ $member_drive }
 api-drive_fault-reset = 故障复位
 api-drive_give-either-raw-value = { $drive }：{ $parameter }：只能给出 raw 或 value 之一
     .remedy = 请只发送两者之一

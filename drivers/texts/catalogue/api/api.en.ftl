@@ -6,3 +6,4 @@ api_nobody-logged = nobody is logged in
 api_nothing = there is nothing at /{ $path }
     .remedy = see /api/v1/openapi.json
 api_see-interface = see /api/v1/openapi.json for what this address takes
+api_page-not-built = The web page is not built. Run `make install` and start again.

@@ -6,3 +6,4 @@ api_nobody-logged = 无人登录
 api_nothing = /{ $path } 处没有内容
     .remedy = 请参见 /api/v1/openapi.json
 api_see-interface = 此地址接受的内容请参见 /api/v1/openapi.json
+api_page-not-built = 网页尚未构建。请运行 `make install`，然后重新启动。

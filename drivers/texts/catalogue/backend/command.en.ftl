@@ -128,3 +128,4 @@ command_without-accounts-servodeck-serves = without accounts servodeck serves on
     .remedy = leave out --single-user, or serve on 127.0.0.1
 command_write-needs-bus-url = --write needs a bus URL and --station
     .remedy = name the drive
+command_seconds = --seconds must be above 0, at most { NUM($most, format: "g") }

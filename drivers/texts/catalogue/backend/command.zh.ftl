@@ -128,3 +128,4 @@ command_without-accounts-servodeck-serves = 没有账户时 servodeck 仅服务�
     .remedy = 请去掉 --single-user，或在 127.0.0.1 上服务
 command_write-needs-bus-url = --write 需要总线 URL 和 --station
     .remedy = 请指定驱动器
+command_seconds = --seconds 必须大于 0，最大为 { NUM($most, format: "g") }

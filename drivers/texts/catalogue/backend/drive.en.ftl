@@ -44,3 +44,7 @@ drive_interrupted = interrupted; the drive may hold either value
 drive_another-serial = { $drive } had serial number { $known }; the drive that answers here now has { $serial }
 drive_exists-only-over = it exists only over { $needed }, and the drive is connected over { $kinds }
 drive_write-only = it can only be written
+drive_fault-by-record = identified by record 0 of the drive's log; the manual does not state that this record is the newest
+drive_fault-look-up = look the code up in the manual of this firmware
+drive_fault-not-in-profile = not in the profile
+drive_label = { $drive }: { $parameter } { $name }

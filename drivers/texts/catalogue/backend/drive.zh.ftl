@@ -44,3 +44,7 @@ drive_interrupted = 已中断；驱动器可能保持其中任一值
 drive_another-serial = { $drive } 的序列号曾为 { $known }；现在应答的驱动器为 { $serial }
 drive_exists-only-over = 仅可通过 { $needed } 访问，而驱动器通过 { $kinds } 连接
 drive_write-only = 只能写入
+drive_fault-by-record = 根据驱动器故障记录中的第 0 条判断；手册未说明该条是否为最新记录
+drive_fault-look-up = 请在此固件的手册中查找该代码
+drive_fault-not-in-profile = 配置文件中没有
+drive_label = { $drive }：{ $parameter } { $name }

@@ -25,7 +25,7 @@ import_damaged-matlab-file = { $value } is a damaged MATLAB file: { $cause }
     .remedy = save it again with save(…, '-v7')
 import_damaged-matlab-file-copy-file = { $value } is a damaged MATLAB file: { $cause }
     .remedy = copy the file again
-import_detail = the { $parameter } cannot be { NUM($value, format: "g") }
+import_detail = the { $what } cannot be { NUM($value, format: "g") }
     .remedy = enter the value from the nameplate
 import_empty = { $name } is empty
     .remedy = export the recording again
@@ -46,7 +46,7 @@ import_holds-no-table-numbers = { $value } holds no table of numbers within its 
     .remedy = export at least two columns of numbers, separated by comma, semicolon or tab
 import_holds-no-vectors-numbers = { $value } holds no vectors of numbers
     .remedy = save time, input and output as vectors
-import_hz = the { $parameter } cannot be { NUM($value, format: "g") } Hz
+import_hz = the { $what } cannot be { NUM($value, format: "g") } Hz
     .remedy = enter it in Hz
 import_hz-give-unit = { $name }: the { $what } is { NUM($value, format: "g") } Hz
     .remedy = give the unit of the time column: s, ms, us or ns
@@ -83,7 +83,7 @@ import_samples = { $name } has too few samples: { NUM($facts, format: ".0f") }
     .remedy = record longer
 import_samples-record-longer = { $name } has too few samples: { $value }
     .remedy = record longer; a few seconds at the drive's fastest rate are enough
-import_says-nothing-input = a { $parameter } does not apply to an input in { $input_unit }
+import_says-nothing-input = a { $what } does not apply to an input in { $input_unit }
     .remedy = give the input's unit, or leave it out
 import_structure-motor-speed-needs = the structure motor_speed needs a speed as output, not { $value }
     .remedy = give the output's unit
@@ -104,3 +104,25 @@ import_unpacks-more-bytes-save-fewer = { $value } unpacks to more than { $max_un
     .remedy = save fewer variables
 import_vectors-differ-length = { $name }: the vectors differ in length: { $value }
     .remedy = save vectors of one length
+import_export-csv = export the recording as CSV
+import_export-csv-mat = export it as CSV or MAT
+import_export-csv-numbers = export the recording's numbers as CSV
+import_export-csv-twincat = export the recording as CSV (TwinCAT Scope: Export, CSV)
+import_is-excel-old = an old Excel workbook
+import_is-pdf = a PDF document
+import_is-picture = a picture
+import_is-tdms = a TDMS file
+import_is-xml = an XML file
+import_is-zip = a zip archive or an Excel workbook
+import_line = line { $number }
+import_row = row { $number }
+import_sample-rate = the sample rate
+import_sample-rate-in = the sample rate (time in { $unit })
+import_save-csv = save it as CSV
+import_unpack-or-csv = unpack it, or save it as CSV
+import_value = { $name ->
+    [output-filter] output filter
+    [current-bandwidth] current bandwidth
+    [rated-torque] rated torque
+   *[torque-constant] torque constant
+}

@@ -25,7 +25,7 @@ import_damaged-matlab-file = { $value } 是损坏的 MATLAB 文件：{ $cause }
     .remedy = 请用 save(…, '-v7') 重新保存
 import_damaged-matlab-file-copy-file = { $value } 是损坏的 MATLAB 文件：{ $cause }
     .remedy = 请重新复制文件
-import_detail = { $parameter } 不能为 { NUM($value, format: "g") }
+import_detail = { $what } 不能为 { NUM($value, format: "g") }
     .remedy = 请输入铭牌上的数值
 import_empty = { $name } 为空
     .remedy = 请重新导出录制
@@ -46,7 +46,7 @@ import_holds-no-table-numbers = { $value } 的前 { $head_lines } 行中没有�
     .remedy = 请导出至少两列数字，以逗号、分号或制表符分隔
 import_holds-no-vectors-numbers = { $value } 没有数字向量
     .remedy = 请将时间、输入和输出保存为向量
-import_hz = { $parameter } 不能为 { NUM($value, format: "g") } Hz
+import_hz = { $what } 不能为 { NUM($value, format: "g") } Hz
     .remedy = 请以 Hz 为单位输入
 import_hz-give-unit = { $name }：{ $what } 为 { NUM($value, format: "g") } Hz
     .remedy = 请给出时间列的单位：s、ms、us 或 ns
@@ -83,7 +83,7 @@ import_samples = { $name } 的采样过少：{ NUM($facts, format: ".0f") } 个
     .remedy = 请录制更长时间
 import_samples-record-longer = { $name } 的采样过少：{ $value } 个
     .remedy = 请录制更长时间；以驱动器最快的速率录制几秒即可
-import_says-nothing-input = { $parameter } 与以 { $input_unit } 为单位的输入无关
+import_says-nothing-input = { $what } 与以 { $input_unit } 为单位的输入无关
     .remedy = 请给出输入的单位，或省略
 import_structure-motor-speed-needs = 结构 motor_speed 需要速度作为输出，而不是 { $value }
     .remedy = 请给出输出的单位
@@ -104,3 +104,25 @@ import_unpacks-more-bytes-save-fewer = { $value } 解压后超过 { $max_unpacke
     .remedy = 请保存较少的变量
 import_vectors-differ-length = { $name }：向量长度不同：{ $value }
     .remedy = 请保存相同长度的向量
+import_export-csv = 请将记录导出为 CSV
+import_export-csv-mat = 请导出为 CSV 或 MAT
+import_export-csv-numbers = 请将记录的数值导出为 CSV
+import_export-csv-twincat = 请将记录导出为 CSV（TwinCAT Scope：Export、CSV）
+import_is-excel-old = 旧版 Excel 工作簿
+import_is-pdf = PDF 文档
+import_is-picture = 图片
+import_is-tdms = TDMS 文件
+import_is-xml = XML 文件
+import_is-zip = zip 压缩包或 Excel 工作簿
+import_line = 第 { $number } 行
+import_row = 第 { $number } 个数据行
+import_sample-rate = 采样率
+import_sample-rate-in = 采样率（时间以 { $unit } 为单位）
+import_save-csv = 请另存为 CSV
+import_unpack-or-csv = 请解压，或另存为 CSV
+import_value = { $name ->
+    [output-filter] 输出滤波器
+    [current-bandwidth] 电流环带宽
+    [rated-torque] 额定转矩
+   *[torque-constant] 转矩常数
+}

@@ -18,7 +18,10 @@ preflight_latency-range = { $value } is not a latency timer
     .remedy = choose { $limit } ms
 preflight_list-preflight-changed-cannot = the list of what the preflight changed cannot be read: { $path }
     .remedy = restart the computer, which restores these settings, and delete the file
-preflight_measurement-failed = the measurement on { $interface } failed: { $reason }
+preflight_measurement-failed = the measurement { $interface ->
+    [none] on this computer
+   *[other] on { $interface }
+ } failed: { $reason }
     .remedy = run the preflight without an interface, and check its first finding
 preflight_no-latency-timer = no latency timer is known of the adapter { $device }
     .remedy = only chips of FTDI have one: check the name of the port

@@ -18,7 +18,10 @@ preflight_latency-range = { $value } 不是延迟计时器的值
     .remedy = 请选择 { $limit } ms
 preflight_list-preflight-changed-cannot = 无法读取预检所作更改的列表：{ $path }
     .remedy = 重新启动计算机以恢复这些设置，然后删除该文件
-preflight_measurement-failed = 在 { $interface } 上的测量失败：{ $reason }
+preflight_measurement-failed = { $interface ->
+    [none] 在本计算机上
+   *[other] 在 { $interface } 上
+ }的测量失败：{ $reason }
     .remedy = 请不带接口运行预检，并先看它列出的第一项
 preflight_no-latency-timer = 不知道适配器 { $device } 的延迟计时器
     .remedy = 只有 FTDI 芯片有：请检查端口名称

@@ -182,3 +182,7 @@ printed_words-to-write = { $count } words are written; digest { $digest }
 printed_words-written = { $count } words written and read back; switch the drive off and on
 printed_write-these = Write these { $count } values?
 printed_written = written: { $file }
+printed_fault = fault
+printed_warning = warning
+printed_not-in-profile = not in the profile
+printed_set-is = the set is{ $missing }

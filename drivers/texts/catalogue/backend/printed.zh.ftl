@@ -176,3 +176,7 @@ printed_words-to-write = 将写入 { $count } 个字；摘要 { $digest }
 printed_words-written = 已写入并回读 { $count } 个字；请将驱动器断电并重新上电
 printed_write-these = 写入这 { $count } 个值？
 printed_written = 已写入：{ $file }
+printed_fault = 故障
+printed_warning = 警告
+printed_not-in-profile = 配置文件中没有
+printed_set-is = 参数集{ $missing }

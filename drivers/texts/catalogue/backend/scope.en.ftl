@@ -6,3 +6,5 @@ scope_no-snapshot-scope = { $value } is not a snapshot of the scope: { $why }
     .remedy = choose a file that the Scope page wrote
 scope_not-stored-disk-nearly = { $path } was not stored: the disk is nearly full, { $free_mib } MiB are left
     .remedy = free some space
+scope_header-not-readable = its header cannot be read
+scope_length-differs = it has { $bytes } bytes, and { $expected } were to be expected

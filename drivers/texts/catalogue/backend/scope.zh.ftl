@@ -6,3 +6,5 @@ scope_no-snapshot-scope = { $value } 不是示波器快照：{ $why }
     .remedy = 请选择“示波器”页面写出的文件
 scope_not-stored-disk-nearly = { $path } 未保存：磁盘将满，剩余 { $free_mib } MiB
     .remedy = 请释放存储空间
+scope_header-not-readable = 无法读取其文件头
+scope_length-differs = 其长度为 { $bytes } 字节，应为 { $expected } 字节

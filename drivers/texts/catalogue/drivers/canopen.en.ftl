@@ -114,3 +114,5 @@ canopen_state-another-master = another master accesses this node
 canopen_state-same-number = two nodes have this number
 canopen_unknown-option = { QUOTED($value) }: unknown option { $unknown }
     .remedy = use only the options within the limit
+canopen_node = node { $node }
+canopen_node-on = node { $node } on { $url }

@@ -114,3 +114,5 @@ canopen_state-another-master = 另一个主站正在访问该节点
 canopen_state-same-number = 两个节点使用该节点号
 canopen_unknown-option = { QUOTED($value) }：未知选项 { $unknown }
     .remedy = 请只使用限值内的选项
+canopen_node = 节点 { $node }
+canopen_node-on = { $url } 上的节点 { $node }

@@ -323,3 +323,6 @@ ethercat_watchdog-ms-not-fit = a watchdog of { NUM($milliseconds_ms, format: "g"
 ethercat_withheld-could-move = it could move the axis ({ $reason })
 ethercat_withheld-process-data = the process data are written as they are chosen
 ethercat_withheld-transition = only commands on the way up to Operational are written
+ethercat_map-aborted = station { $station } aborted { $object } ({ $cause })
+ethercat_map-failed = station { $station }: { $cause }
+ethercat_map-unexpected-mail = an emergency or another unexpected mail came in between

@@ -36,3 +36,5 @@ link_terminal-servodeck-itself-runs = { $value } is the terminal that servodeck 
 link_wire-running-demo = { $bus } exists only while the demo runs
     .remedy = start 'servodeck demo', or give the path of a real or virtual port
 link_write-it-like = write it like { $example }
+link_station = station { $station }
+link_drive-at = { $drive } station { $station }

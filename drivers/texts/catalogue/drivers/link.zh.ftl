@@ -36,3 +36,5 @@ link_terminal-servodeck-itself-runs = { $value } 是 servodeck 自身运行的�
 link_wire-running-demo = { $bus } 仅在演示运行时存在
     .remedy = 请启动 'servodeck demo'，或给出真实或虚拟端口的路径
 link_write-it-like = 请写成 { $example }
+link_station = 站 { $station }
+link_drive-at = { $drive } 站 { $station }

@@ -14,12 +14,12 @@ profile_not-readable = { $file } cannot be read: { $detail }
     .remedy = give the user that runs servodeck the right to read it
 profile_not-utf8 = a file of profile { $name } is not UTF-8: { $detail }
     .remedy = save the file as UTF-8
-profile_overlay-refused = overlay { $name }: { $detail }
+profile_overlay-refused = overlay { $name }: { $refused }
     .remedy = correct the file, then see `servodeck profile check`
 profile_refused = profile { $name }: { $errors ->
     [one] { $errors } error
    *[other] { $errors } errors
- }: { $detail }
+ }: { $refused }
     .remedy = correct the file, then see `servodeck profile check`
 profile_shared-field = { $file }: shared is no field of a file
     .remedy = use common
@@ -29,3 +29,9 @@ profile_text-twice = { $file }: { $field } gives { $keys } again
     .remedy = keep one of the two
 profile_unknown = no profile named { QUOTED($name) }; there are: { $known }
     .remedy = choose one of these
+profile_brake-test-one-of = brake_test: give output_function or obstacle, and not both
+profile_keys-missing = unknown parameters referred to: { $keys }
+profile_keys-twice = parameter keys appear twice: { $keys }
+profile_limits-reversed = { $key }: min_raw { $low } is above max_raw { $high }
+profile_no-regular-expression = { QUOTED($pattern) } is no regular expression: { $cause }
+profile_record = { $place } ({ $key }): { $reason }

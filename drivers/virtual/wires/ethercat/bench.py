@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from drivers.errors import NotAllowed
+from drivers.texts.message import Unsuitable, text
 from drivers.virtual.bench import AxisSpec, load_bench
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.motion.gantry import VirtualGantry
@@ -60,7 +61,7 @@ def couple(path: Path, axes: Sequence[AxisSpec], devices: Sequence[Device]) -> N
         if first is None or second is None:
             continue  # a beam of another segment
         if not isinstance(first, VirtualServo) or not isinstance(second, VirtualServo):
-            raise ValueError("a gantry needs virtual servo drives")  # noqa: TRY004 - of a file
+            raise Unsuitable(text("mechanics.gantry-of-servos"))
         VirtualGantry(gantry, first, second)
 
 

@@ -1,6 +1,7 @@
 import { useCallback, useEffect, useSyncExternalStore } from 'react'
 import { api, ask } from '../../api/client'
-import { useLanguage } from '../../i18n'
+import { textsCame, useLanguage } from '../../i18n'
+import { fetchProfilesBy, keepProfile } from '../../i18n/message'
 import { useDrive, useDrives, useLink } from '../../live/store'
 import { keep, kept } from '../kept'
 
@@ -33,12 +34,18 @@ function load(profile: string): void {
     }),
   ).then(
     (found) => {
-      loaded.set(profile, new Map(Object.entries(found.texts)))
+      const texts = new Map(Object.entries(found.texts))
+      loaded.set(profile, texts)
+      keepProfile(profile, texts)
       changed()
+      textsCame()
     },
     () => asked.delete(profile),
   )
 }
+
+// A message in the log may be of a drive that is not on the page.
+fetchProfilesBy(load)
 
 /** The translated texts of a drive's profile; null in English and until they are known. */
 export function useTexts(drive: string): Texts {

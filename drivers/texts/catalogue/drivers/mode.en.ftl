@@ -1,0 +1,10 @@
+mode_no-mode = No mode
+mode_profile-position = Profile position
+mode_velocity = Velocity
+mode_profile-velocity = Profile velocity
+mode_profile-torque = Profile torque
+mode_homing = Homing
+mode_interpolated-position = Interpolated position
+mode_cyclic-synchronous-position = Cyclic synchronous position
+mode_cyclic-synchronous-velocity = Cyclic synchronous velocity
+mode_cyclic-synchronous-torque = Cyclic synchronous torque

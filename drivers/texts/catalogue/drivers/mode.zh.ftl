@@ -1,0 +1,10 @@
+mode_no-mode = 无模式（No mode）
+mode_profile-position = 轮廓位置（Profile position）
+mode_velocity = 速度（Velocity）
+mode_profile-velocity = 轮廓速度（Profile velocity）
+mode_profile-torque = 轮廓转矩（Profile torque）
+mode_homing = 回零（Homing）
+mode_interpolated-position = 插补位置（Interpolated position）
+mode_cyclic-synchronous-position = 周期同步位置（Cyclic synchronous position）
+mode_cyclic-synchronous-velocity = 周期同步速度（Cyclic synchronous velocity）
+mode_cyclic-synchronous-torque = 周期同步转矩（Cyclic synchronous torque）
