@@ -535,8 +535,8 @@ class inertia_probe:
     GAINED = 0.1
     """[ratio] Share of the energy moved to and fro that noise alone does not make. Origin: 7166e5a3
     with benchmarks/tune_accuracy."""
-    # RIGID, AGAINST: A fitted inertia below this share of what the momentum of the pulse gives is not
-    # that of a rigid body; one below minus that share is of a body that moves against its torque.
+    # RIGID, AGAINST: A fitted inertia below this share of what the momentum of the pulse gives is
+    # not that of a rigid body; below minus that share the body moves against its torque.
     # Simulated: 0.7 to 1 for rigid axes, down to -0.2 for 12 times the motor on a coupling of 2 to
     # 8 Hz.
     RIGID = 0.25
