@@ -1069,12 +1069,12 @@ class load_response:
     """`response/load_response.py`."""
 
     FEWEST = 100
-    """[count] Samples below which a recording shows no scale. Origin: 22dd7a08."""
+    """[count] Samples below which a recording shows no scale. Origin: a571816a."""
     LEFT = 0.02
     """[ratio] An encoder does not follow the motor where more than this share of the power of its
-    motion is not the motor's. Origin: 22dd7a08."""
+    motion is not the motor's. Origin: a571816a."""
     NEAR = 9
-    """[lines] So many lines around one have an error of the torque in common. Origin: 22dd7a08."""
+    """[lines] So many lines around one have an error of the torque in common. Origin: a571816a."""
 
 
 class reported:

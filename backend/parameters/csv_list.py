@@ -175,7 +175,8 @@ def _headed(cells: list[str]) -> _Columns | None:
                 places.setdefault(column, place)
     if not ({"key", "index"} & places.keys() and {"raw", "value"} & places.keys()):
         return None
-    return _Columns(**places)
+    at = {column: places.get(column, -1) for column in _HEADINGS}
+    return _Columns(at["key"], at["index"], at["subindex"], at["raw"], at["value"], at["unit"])
 
 
 def _bare(cells: list[str]) -> _Columns:

@@ -22,9 +22,9 @@ def longest_path(registry: Registry = windows_registry) -> int | None:
 
     CPython allows longer paths on Windows where the computer has the setting LongPathsEnabled.
     """
-    if sys.platform != "win32" or registry(_FILE_SYSTEM, "LongPathsEnabled") == 1:
-        return None
-    return _MAX_PATH
+    if sys.platform == "win32" and registry(_FILE_SYSTEM, "LongPathsEnabled") != 1:
+        return _MAX_PATH
+    return None
 
 
 def write_parts(descriptor: int, parts: Sequence[bytes | memoryview]) -> int:

@@ -152,21 +152,24 @@ def restart_device(instance: str) -> bool:
     False with a Windows before version 2004, without an administrator (exit code 5), and where the
     computer must be restarted for it (3010).
     """
-    if sys.platform != "win32" or sys.getwindowsversion().build < _RESTARTS_SINCE:
+    if sys.platform == "win32":
+        if sys.getwindowsversion().build < _RESTARTS_SINCE:
+            return False
+        # Its full path: this process can be an administrator's.
+        program = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "pnputil.exe")
+        try:
+            done = subprocess.run(
+                [str(program), "/restart-device", instance],
+                capture_output=True,
+                check=False,
+                timeout=_RESTART_S,
+                creationflags=subprocess.CREATE_NO_WINDOW,
+            )
+        except (OSError, subprocess.TimeoutExpired):
+            return False
+        return done.returncode == 0
+    else:  # noqa: RET505 - type checkers follow the branches of a system
         return False
-    # Its full path: this process can be an administrator's.
-    program = Path(os.environ.get("SYSTEMROOT", r"C:\Windows"), "System32", "pnputil.exe")
-    try:
-        done = subprocess.run(
-            [str(program), "/restart-device", instance],
-            capture_output=True,
-            check=False,
-            timeout=_RESTART_S,
-            creationflags=subprocess.CREATE_NO_WINDOW,
-        )
-    except (OSError, subprocess.TimeoutExpired):
-        return False
-    return done.returncode == 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import re
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 import serial
 
@@ -29,6 +30,7 @@ if sys.platform != "win32":
     TERMINAL_ERRORS = (termios.error,)
 else:
     TERMINAL_ERRORS = ()
+_OPENING_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, *TERMINAL_ERRORS)
 
 #: Rates of Linux (asm-generic/termbits.h) without a name in Python's termios.
 _LINUX_SPEEDS = {
@@ -106,7 +108,7 @@ def is_in_use(device: str) -> bool:
     """Return whether a program has this serial port open; the port is opened for an instant."""
     try:
         serial.Serial(device, timeout=0, **port_options()).close()
-    except (OSError, ValueError, *TERMINAL_ERRORS) as error:
+    except _OPENING_ERRORS as error:
         return port_errno(error) in (errno.EBUSY, errno.EAGAIN)
     return False
 
@@ -121,7 +123,7 @@ def own_terminals() -> set[str]:
     return found
 
 
-def port_options() -> dict[str, bool]:
+def port_options() -> dict[str, Any]:
     """Return pyserial's options besides the line settings: exclusive use of the port.
 
     A COM port is always exclusive; pyserial rejects the option there.
