@@ -1,7 +1,6 @@
 import { asked, serve } from '../../testing/bench'
 import { createElement, useState } from 'react'
 import { beforeEach, describe, expect, it, vi } from 'vitest'
-import type { RecordingPreview } from '../../api/schema'
 import { NumberField } from '../../widgets/NumberField'
 import { type Drawn, Page, press, type } from '../../testing/render'
 import { HealthPermission } from '../tune/health/HealthPermission'
