@@ -206,14 +206,18 @@ def judge(
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
     nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
-    designed = _beyond(frequency_hz, possible, nominal_only, top)
+    # Where the lines show no crossover, it is one of the prediction, wherever that has it.
+    shown = seen is not None and seen.phase_margin_deg is not None
+    designed = _beyond(frequency_hz, possible, nominal_only, top, needs_phase=not shown)
     sound = bool(np.all(stable(possible)))
     every = possible
     if alternatives is not None and shown_gain_db is not None:
         others = _moved(frequency_hz, alternatives, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
-    beyond = _beyond(frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db)
+    beyond = _beyond(
+        frequency_hz, every, nominal_only, top, threshold.PER_OCTAVE, shown_gain_db, not shown
+    )
     stated, worst = _worst(seen, beyond)
     return LoopVerdict(
         measured, beyond, last, coverage, shown_gain_db, stated, worst, sound,
@@ -345,18 +349,22 @@ def _beyond(
     from_hz: float,
     per_octave: float = 0.0,
     shown_gain_db: float | None = None,
+    needs_phase: bool = False,
 ) -> BandVerdict | None:
     """Margins above the measured band: of the nominal loop, and the worst of the possible loops.
 
     The uncertainty of a gain margin grows by ``per_octave`` (logarithm); a gain margin shown by a
-    raised gain is certain.
+    raised gain is certain. ``needs_phase``: a loop that crosses 0 dB below the band only has the
+    phase margin of that crossover, which nothing else shows.
     """
-    use: BoolArray = frequency_hz >= from_hz
-    if np.count_nonzero(use) < 2:
+    first = int(np.searchsorted(frequency_hz, from_hz))
+    # A crossover may lie between the last line and the first frequency above it.
+    use: BoolArray = np.arange(frequency_hz.size) >= max(first - 1, 0)
+    if frequency_hz.size - first < 2:
         return None
     f = frequency_hz[use]
     worst, mean = worst_of(possible[:, use]), worst_of(nominal[:, use])
-    octaves = np.log2(f / from_hz) if from_hz > 0.0 else np.zeros(f.size)
+    octaves = np.log2(np.maximum(f / from_hz, 1.0)) if from_hz > 0.0 else np.zeros(f.size)
     larger = np.exp(per_octave * octaves)
     least_db = max(worst_of(possible[:, use] * larger).gain_margin_db, shown_gain_db or 0.0)
     least_db = min(worst.gain_margin_db, least_db)
@@ -368,9 +376,12 @@ def _beyond(
         if crosses
         else None
     )
+    if phase is None and needs_phase and first > 1:
+        whole = _beyond(frequency_hz, possible, nominal, 0.0)
+        phase = None if whole is None else whole.phase_margin_deg
     gain = Interval(mean.gain_margin_db, least_db, mean.gain_margin_db)
     return BandVerdict(
-        float(f[0]),
+        max(float(f[0]), from_hz),
         float(f[-1]),
         phase,
         gain if least_db < threshold.MOST_DB else None,
