@@ -10,7 +10,7 @@ import asyncio
 import itertools
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -187,8 +187,21 @@ def _judged(name: str, recording: Recording, rated_nm: float) -> Probed:
         recording.torque_nm, recording.velocity_rad_s, recording.sample_rate_hz, recording.valid
     )
     if fit.inertia_kgm2 <= 0:
-        raise _wrong_sign(name)
+        power = (recording.torque_nm * recording.velocity_rad_s)[recording.valid]
+        if float(np.sum(power)) <= threshold.GAINED * float(np.sum(np.abs(power))):
+            raise _wrong_sign(name)
+        # A motor that takes energy has the right signs: a load that oscillates behind a soft
+        # coupling moves it against the torque for a time.
+        fit = replace(fit, inertia_kgm2=_by_momentum(recording))
     return Probed(fit.inertia_kgm2, max(fit.coulomb_nm, 0.0), fit.gravity_nm, rated_nm)
+
+
+def _by_momentum(recording: Recording) -> float:
+    """Inertia that the largest change of speed shows [kg·m²]: too high next to friction."""
+    momentum = np.cumsum(np.where(recording.valid, recording.torque_nm, 0.0))
+    peak = float(np.max(np.abs(recording.velocity_rad_s)))
+    swing = float(np.max(np.abs(momentum))) / recording.sample_rate_hz
+    return swing / max(2.0 * peak, 1e-9)
 
 
 def require_right_sign(name: str, recording: Recording) -> None:
