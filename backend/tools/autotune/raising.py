@@ -66,14 +66,15 @@ def not_shown(
     said = in_words(misses(verdict, guaranteed))
     wanted = wanted_db(missed, guaranteed)
     if shown.shown_db < wanted - MARGIN_DB:
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
-        said.append(
-            text(
-                "autotune.crossover-not-shown",
-                crossover_hz=verdict.last_crossover_hz,
-                measured_hz=top,
-                shown_db=shown.shown_db,
-                wanted_db=wanted,
+        gains = {"shown_db": shown.shown_db, "wanted_db": wanted}
+        last_hz = verdict.last_crossover_hz
+        if verdict.measured is None:
+            said.append(
+                text("autotune.crossover-unmeasured-not-shown", crossover_hz=last_hz, **gains)
             )
-        )
+        else:
+            top = verdict.measured.high_hz
+            said.append(
+                text("autotune.crossover-not-shown", crossover_hz=last_hz, measured_hz=top, **gains)
+            )
     return said

@@ -322,12 +322,14 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
     if verdict is not None:
         if verdict.coverage != "gain_steps" or verdict.shown_gain_db is None:
             return None
-        top = 0.0 if verdict.measured is None else verdict.measured.high_hz
+        last, gain = verdict.last_crossover_hz, verdict.shown_gain_db
+        if verdict.measured is None:
+            return text("autotune.margins-bounded-unmeasured", crossover_hz=last, gain_db=gain)
         return text(
             "autotune.margins-bounded",
-            crossover_hz=verdict.last_crossover_hz,
-            measured_hz=top,
-            gain_db=verdict.shown_gain_db,
+            crossover_hz=last,
+            measured_hz=verdict.measured.high_hz,
+            gain_db=gain,
         )
     frf = verified.sweep.frf
     lines = frf.frequency_hz[frf.in_band & (frf.coherence > COHERENT)]
