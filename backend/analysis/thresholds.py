@@ -459,6 +459,12 @@ class inertia:
     """[s] What the model leaves may be alike for about this long. Origin: 0f3c9bfa."""
     FEWEST = 20
     """[count] Fewer samples give no regression. Origin: 0f3c9bfa."""
+    SAMPLED_S = 25e-6
+    """[s] Half of a drive's loop period of 50 µs, within which torque and position are sampled.
+    Origin: tests/unit/analysis/test_analysis_inertia.py."""
+    LATER_S = 50e-6
+    """[s] A torque that is later than the motion by more than a loop period may be that of
+    setpoints that are held. Origin: tests/unit/analysis/test_analysis_inertia.py."""
     DISTINGUISHED = 0.01
     """[ratio] Share of the Coulomb friction that may have been mistaken for viscous friction.
     Origin: f9af5d30 with benchmarks/chaos/run."""
@@ -557,6 +563,17 @@ class load_terms:
     Origin: a3ccf14b with docs/tuning-accuracy.md."""
     DIFFERENCE = 1e-3
     """[ratio] Relative step of numerical slopes. Origin: 6673eb21."""
+    CRANKS = (1.0, 2.0)
+    """[1/rev] Variations of the inertia that are tried, per turn of the motor: an eccentric load
+    and a crank. Origin: tests/unit/analysis/test_analysis_load_terms.py."""
+    # REST_LENGTHS, RESTS, RESTS_STEP: Ways over which friction rises after a reversal that are
+    # tried, how many of them stand for one law, and the relative step of numerical slopes.
+    REST_LENGTHS = (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+    """[rad] Origin: tests/unit/analysis/test_analysis_load_terms.py."""
+    RESTS = 2
+    """[count] Origin: tests/unit/analysis/test_analysis_load_terms.py."""
+    RESTS_STEP = 0.2
+    """[ratio] Origin: tests/unit/analysis/test_analysis_load_terms.py."""
 
 
 class mode_uncertainty:

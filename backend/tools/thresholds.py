@@ -458,6 +458,12 @@ class inertia_evaluation:
     """[ratio] Origin: ba28e55a."""
     SWING_HZ = (4.0, 80.0)
     """[Hz] Origin: ba28e55a."""
+    # LOOP_EXPLAINED, LOOP_LATEST: A speed loop whose gains explain this share of the torque is
+    # seen; its torque follows its error by fewer than so many cycles.
+    LOOP_EXPLAINED = 0.9
+    """[ratio] Origin: tests/unit/backend/test_inertia_sampled.py."""
+    LOOP_LATEST = 6
+    """[count] Origin: tests/unit/backend/test_inertia_sampled.py."""
 
 
 class inertia_moves:

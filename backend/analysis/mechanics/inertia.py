@@ -130,6 +130,7 @@ def estimate_inertia(
     motor_inertia_kgm2: float | None = None,
     valid: BoolArray | None = None,
     position_rad: FloatArray | None = None,
+    loop_nms: float | None = None,
 ) -> InertiaResult:
     """Regress over whole recordings of moves in both directions.
 
@@ -138,7 +139,9 @@ def estimate_inertia(
     with a reference that steps every cycle T, the torque sampled next to each step has an error of
     half a step, about ω_speed·T/2 of the acceleration torque. ``position_rad`` [n] is the motor's;
     without it the speed is integrated. Samples at the torque limit, in gaps (``valid`` False) and
-    within the filter's reach of either are left out.
+    within the filter's reach of either are left out. ``loop_nms`` is the gain of the speed loop
+    that made the moves, None where it is not known: by it the interval of the inertia includes
+    what the moment of sampling within a cycle makes of the torque (`_sampled`).
 
     Raises:
         ValueError: the arrays differ in length, or are shorter than the filter.
@@ -171,7 +174,13 @@ def estimate_inertia(
     if samples < threshold.FEWEST:
         return _nothing(saturated_share)
     middle = 0.5 * (float(np.min(angle)) + float(np.max(angle)))
-    motion = Motion(velocity_rad_s, angle - middle, lambda x: _smooth(x, kernel))
+    slope = _slope_kernel(kernel)
+    motion = Motion(
+        velocity_rad_s,
+        angle - middle,
+        lambda x: _smooth(x, kernel),
+        lambda x: _smooth(x, slope) * sample_rate_hz,
+    )
     highest_hz = threshold.SWINGS_TO * cutoff_hz
     terms, matrix, bends = _machine(matrix, torque, motion, keep, sample_rate_hz, highest_hz)
     found, sizes = _regress(
@@ -183,7 +192,38 @@ def estimate_inertia(
         saturated_share,
         motor_inertia_kgm2,
     )
+    if loop_nms and np.isfinite(found.inertia_kgm2.value):
+        late_s = 0.0
+        if position_rad is not None:
+            # By the position: a reported speed may be late by itself.
+            speed = np.gradient(angle) * sample_rate_hz
+            rigid = _columns(speed, kernel, slowest, sample_rate_hz)
+            late_s = _torque_late(np.column_stack([rigid, matrix[:, _RIGID:]])[keep], torque[keep])
+        sampled = _sampled(found.inertia_kgm2, loop_nms, late_s, 1.0 / sample_rate_hz)
+        found = replace(found, inertia_kgm2=sampled)
     return replace(found, load_terms=terms.sized(motion, sizes[_RIGID:]))
+
+
+def _torque_late(a: FloatArray, b: FloatArray) -> float:
+    """Time [s] by which the torque b is later than the motion of the columns a; 0 if not later."""
+    scale = np.maximum(np.max(np.abs(a), axis=0), 1e-12)
+    x = _huber(a / scale, b)[0] / scale
+    return float(max(-x[4] / x[0], 0.0)) if x[0] > 0 else 0.0
+
+
+def _sampled(inertia: Interval, loop_nms: float, late_s: float, cycle_s: float) -> Interval:
+    """Interval of the inertia with the uncertainty of the moment at which the torque is sampled.
+
+    Setpoints that are held make the torque of a speed loop a sawtooth in step with the samples:
+    they are off by the gain times up to half a cycle times the acceleration of the setpoint, which
+    is collinear with the inertia's torque. The sampled torque is then later than the motion. A
+    filter of 6077h looks alike, so that either may be. Otherwise the moment is not known better
+    than `threshold.SAMPLED_S`.
+    """
+    half = np.hypot(0.5 * (inertia.high - inertia.low), loop_nms * threshold.SAMPLED_S)
+    held = 0.5 * cycle_s * loop_nms if late_s > threshold.LATER_S else 0.0
+    middle = 0.5 * (inertia.high + inertia.low)
+    return Interval(inertia.value, float(middle - half), float(middle + half + held))
 
 
 def _machine(

@@ -67,16 +67,13 @@ def not_shown(
     wanted = wanted_db(missed, guaranteed)
     if shown.shown_db < wanted - MARGIN_DB:
         crossover_hz, end_hz = verdict.uncovered or (verdict.last_crossover_hz, 0.0)
-        code = "autotune.crossover-not-shown"
-        if crossover_hz < end_hz:
-            code = "autotune.crossover-below-not-shown"
-        said.append(
-            text(
-                code,
-                crossover_hz=crossover_hz,
-                measured_hz=end_hz,
-                shown_db=shown.shown_db,
-                wanted_db=wanted,
-            )
-        )
+        gains = {"shown_db": shown.shown_db, "wanted_db": wanted}
+        if end_hz == 0.0:
+            code = "autotune.crossover-unmeasured-not-shown"
+            said.append(text(code, crossover_hz=crossover_hz, **gains))
+        else:
+            code = "autotune.crossover-not-shown"
+            if crossover_hz < end_hz:
+                code = "autotune.crossover-below-not-shown"
+            said.append(text(code, crossover_hz=crossover_hz, measured_hz=end_hz, **gains))
     return said

@@ -171,6 +171,8 @@ def in_words(missed: tuple[Missed, ...]) -> list[Text]:
             said.append(text("autotune.contradiction", gain_db=each.value))
         elif each.what == "stability":
             said.append(text("autotune.not-stable"))
+        elif each.what == "coverage" and each.limit == 0.0:
+            said.append(text("autotune.crossover-unmeasured", crossover_hz=each.value))
         elif each.what == "coverage":
             below = each.value < each.limit
             code = (

@@ -324,6 +324,9 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
         if verdict.coverage != "gain_steps" or gain_db is None or verdict.uncovered is None:
             return None
         crossover_hz, end_hz = verdict.uncovered
+        if end_hz == 0.0:
+            code = "autotune.margins-bounded-unmeasured"
+            return text(code, crossover_hz=crossover_hz, gain_db=gain_db)
         code = "autotune.margins-bounded"
         if crossover_hz < end_hz:
             code = "autotune.margins-below-bounded"

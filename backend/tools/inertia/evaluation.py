@@ -73,6 +73,7 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
             motor_inertia_kgm2=facts.motor_inertia_kgm2,
             valid=recording.valid,
             position_rad=recording.position_rad if np.any(recording.position_rad) else None,
+            loop_nms=_loop_gain(recording),
         )
     except ValueError as error:
         raise NotAllowed(
@@ -84,6 +85,35 @@ def evaluate(recording: Recording, settings: InertiaSettings, facts: AxisFacts) 
     if found.load_ratio is None and reference and np.isfinite(found.inertia_kgm2.value):
         return replace(found, load_ratio=found.inertia_kgm2.value / reference - 1.0)
     return found
+
+
+def _loop_gain(recording: Recording) -> float | None:
+    """Gain [Nm·s] of the speed loop that made the moves; None where they do not show it.
+
+    The torque is regressed on speed error and its integral. Setpoints and torque offset are in the
+    drive's units, whose scale the columns of the setpoint, its integral and the offset absorb.
+    """
+    use, sent, velocity = recording.valid, recording.sent, recording.velocity_rad_s
+    power = float(np.dot(sent[use], sent[use]))
+    if np.count_nonzero(use) < 8 or not np.isfinite(power) or power == 0.0:
+        return None
+    wanted = sent * (float(np.dot(sent[use], velocity[use])) / power)
+    best, gain = threshold.LOOP_EXPLAINED, None
+    torque = recording.torque_nm[use]
+    for late in range(threshold.LOOP_LATEST):
+        set_before = np.concatenate([np.zeros(late), wanted[: wanted.size - late]])
+        error = set_before - velocity
+        rows = [error, set_before, np.cumsum(error), np.cumsum(set_before), np.ones(error.size)]
+        if np.any(recording.offset):
+            rows.append(recording.offset)
+        columns = np.column_stack(rows)[use]
+        scale = np.maximum(np.max(np.abs(columns), axis=0), 1e-300)
+        x = np.linalg.lstsq(columns / scale, torque, rcond=None)[0]
+        spread = float(np.var(torque))
+        share = 1.0 - float(np.var(torque - columns / scale @ x)) / spread if spread else 0.0
+        if share > best and x[0] > 0.0:
+            best, gain = share, float(x[0] / scale[0])
+    return gain
 
 
 def uncertainty_of(result: InertiaResult) -> float:

@@ -45,12 +45,13 @@ def make_device(
         name = "generic402"
     if name not in known:
         raise Unsuitable(text("mechanics.no-virtual", drive=profile.drive, known=", ".join(known)))
-    family = families.family_of(profile, name)
     if mechanics is None:
         mechanics = standard_mechanics()
     elif not isinstance(mechanics, MechanicsSpec):
         mechanics = MechanicsSpec.model_validate(dict(mechanics))
     profile = without_lacking(profile, mechanics.rough_feedback)
+    # The family decides by the objects that this drive has.
+    family = families.family_of(profile, name)
     profile = without_load_encoder(profile, mechanics.load_encoder)
     if family.supply_v is not None and "supply" not in mechanics.model_fields_set:
         supply = mechanics.supply.model_copy(update={"voltage_v": family.supply_v})

@@ -32,7 +32,11 @@ def without_lacking(profile: Profile, rough: RoughFeedbackSpec) -> Profile:
     kept = tuple(p for p in profile.parameters if p.key.split(":")[0] not in lacking)
     keys = {p.key for p in kept}
     signals = tuple(signal for signal in profile.signals if signal.key in keys)
-    return profile.model_copy(update={"parameters": kept, "signals": signals})
+    copy = profile.model_copy(update={"parameters": kept, "signals": signals})
+    # A copy of a model keeps what was computed of the original.
+    for name in ("by_key", "by_role", "unit_keys"):
+        copy.__dict__.pop(name, None)
+    return copy
 
 
 def unit_values(profile: Profile, rough: RoughFeedbackSpec) -> dict[str, Raw]:

@@ -32,6 +32,7 @@ def write_rough_torque(p: Parameters, spec: MechanicsSpec) -> None:
     p[k.P_ROUGH_INERTIA_PER_REV] = rough.inertia_per_rev
     stiffness = spec.load[0].stiffness_nm_per_rad if spec.load else 0.0
     p[k.P_ROUGH_STIFFNESS] = rough.stiffness_share * stiffness
+    p[k.P_ROUGH_FIRST_INERTIA] = spec.load[0].inertia_kgm2 if spec.load else 1.0
     p[k.P_ROUGH_STIFF_PER_REV] = rough.stiffness_per_rev
     p[k.P_ROUGH_SLIP] = rough.slip_per_s
     p[k.P_ROUGH_DIP_SHARE] = rough.dip_share

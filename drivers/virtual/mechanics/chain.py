@@ -131,8 +131,10 @@ def analytic_response(
     """
     s = 2j * math.pi * np.asarray(f_hz, dtype=np.float64)
     behind = np.zeros_like(s, dtype=np.complex128)
-    for load in reversed(spec.load):
-        coupling = load.stiffness_nm_per_rad / s + load.damping_nms_per_rad
+    for i, load in reversed(list(enumerate(spec.load))):
+        # A belt that slips by a share of its twist in a second is a linear relaxation.
+        slip = spec.rough_torque.slip_per_s if i == 0 else 0.0
+        coupling = load.stiffness_nm_per_rad / (s + slip) + load.damping_nms_per_rad
         hanging = s * load.inertia_kgm2 + behind
         behind = coupling * hanging / (coupling + hanging)
     impedance = s * spec.motor.inertia_kgm2 + spec.friction.viscous_nms + behind

@@ -88,6 +88,43 @@ def test_what_it_is_and_how_large_is_reported():
     assert min(straight.periods_rad) > 0.0
 
 
+def hose(angle, _speed):
+    """Bouc-Wen hysteresis of second order over 0.6 rad, which is neither a play nor Dahl's law."""
+    force, state = np.zeros(angle.size), 0.0
+    for i, step in enumerate(np.diff(angle), 1):
+        state += step / 0.6 * (1.0 - np.sign(step * state) * state**2)
+        force[i] = state = float(np.clip(state, -1.0, 1.0))
+    return 0.02 * force
+
+
+@pytest.mark.parametrize("ratio", [1, 8, 25])
+def test_a_hose_that_yields_is_friction_and_no_inertia(ratio):
+    inertia = MOTOR * (1 + ratio)
+    result = found(inertia, hose)
+    assert result.reasons == ()
+    assert result.inertia_kgm2.low <= inertia <= result.inertia_kgm2.high
+    assert result.inertia_kgm2.value == pytest.approx(inertia, rel=0.005)
+    assert result.coulomb_nm.low <= COULOMB + 0.02 <= result.coulomb_nm.high
+    assert result.coulomb_nm.value == pytest.approx(COULOMB + 0.02, rel=0.05)
+    assert result.load_terms.place_nm == 0.0
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_an_inertia_that_varies_by_the_position_is_neither_friction_nor_place(order):
+    def crank(angle, speed):
+        """T = dJ·a + dJ'·v²/2 (Lagrange)."""
+        phase, share = order * angle + 0.7, 0.15 * MOTOR
+        acceleration = np.gradient(speed) * RATE
+        return share * (np.sin(phase) * acceleration + 0.5 * order * np.cos(phase) * speed**2)
+
+    result = found(2 * MOTOR, crank)
+    assert result.reasons == ()
+    assert result.inertia_kgm2.low <= 2 * MOTOR <= result.inertia_kgm2.high
+    assert result.inertia_kgm2.value == pytest.approx(2 * MOTOR, rel=0.005)
+    assert result.coulomb_nm.low <= COULOMB <= result.coulomb_nm.high
+    assert result.load_terms.place_nm == 0.0
+
+
 @pytest.mark.parametrize("ratio", [0, 1, 10, 30])
 @pytest.mark.parametrize("noise_nm", [0.0005, 0.002, 0.02])
 def test_nothing_is_seen_where_nothing_is(ratio, noise_nm):

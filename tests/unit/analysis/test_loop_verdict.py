@@ -161,6 +161,27 @@ def test_lines_that_begin_above_the_crossover_still_count_where_they_are() -> No
     assert found.stated.ms == pytest.approx(float(np.max(np.abs(1 / (1 + loop)))), rel=0.01)
 
 
+@pytest.mark.parametrize("apart", [0.9985, 0.9995])
+def test_a_crossover_just_above_the_last_line_has_a_phase_margin(apart: float) -> None:
+    """Between the last line and the next frequency of the prediction, which are 0.3 % apart."""
+    for crossover in np.geomspace(100.0, 104.0, 9):
+        for shown in (None, 6.0):
+            found = verdict_of(crossover, 0.5e-3, apart * crossover, shown_db=shown)
+            true_deg = 90 - 360 * crossover * 0.5e-3
+            assert found.stated.phase_margin_deg == pytest.approx(true_deg, abs=1.5)
+            assert found.worst.phase_margin_deg < true_deg
+
+
+def test_a_crossover_that_is_predicted_below_lines_that_do_not_show_it_counts() -> None:
+    """The lines still have 0 dB and more at their end; the prediction crosses below it."""
+    f = np.linspace(5.0, 100.0, 100)
+    loop, nominal = loop_of(f, 110.0, 1e-3), loop_of(DENSE, 85.0, 1e-3)
+    lines = Lines(f, loop / (1 + loop), np.full(f.size, 0.01))
+    found = judge(lines, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.01))
+    assert found.stated.phase_margin_deg == pytest.approx(90 - 360 * 85.0 * 1e-3, abs=1.5)
+    assert found.stated.phase_margin_deg < 90.0
+
+
 def test_a_raised_gain_covers_it() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0, shown_db=6.5)
     assert found.coverage == "gain_steps"

@@ -10,13 +10,14 @@ import pytest
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals
 from backend.analysis.loop.loop_structure import Gains
+from backend.analysis.loop.loop_verdict import Missed
 from backend.analysis.loop.margins import Margins
 from backend.analysis.response.frf import Frf
 from backend.axis.axis import Envelope
 from backend.tools.autotune import verify as tune_verify
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verdict import reported_lines, sharp_lines
+from backend.tools.autotune.verdict import in_words, reported_lines, sharp_lines
 from backend.tools.autotune.verify import (
     Check,
     Verified,
@@ -297,3 +298,11 @@ async def test_more_realisations_that_blur_all_lines_take_nothing_away(
     assert pairs == [1, 4]
     assert found.kept
     assert found.measured_bandwidth_hz == sharp_margins(loop_swept(1.0))["bandwidth_hz"]
+
+
+def test_a_crossover_that_no_line_shows_is_not_called_one_above_the_band() -> None:
+    """Without a measured crossover there is no band that it could lie above."""
+    unmeasured, above = in_words((Missed("coverage", 87.0, 0.0), Missed("coverage", 474.0, 246.0)))
+    assert unmeasured.code == "autotune.crossover-unmeasured"
+    assert " 0 Hz" not in unmeasured.words()
+    assert above.code == "autotune.crossover-above-measured"

@@ -15,7 +15,7 @@ from benchmarks._true_loop import true_loop
 from benchmarks.rough_campaign import Tally, lines_of, table
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.firmware.servo import VirtualServo
-from drivers.virtual.mechanics import RoughTorqueSpec
+from drivers.virtual.mechanics import RoughTorqueSpec, analytic_response
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics
 
@@ -43,6 +43,27 @@ def test_the_true_loop_is_that_of_its_physics() -> None:
     ratio = true_loop(device, f) / rigid
     assert np.abs(ratio[0]) == pytest.approx(1.0, rel=0.01)
     assert np.degrees(np.angle(ratio[0])) == pytest.approx(0.0, abs=2.0)
+
+
+def test_a_drive_without_a_feed_constant_counts_its_encoder() -> None:
+    """Its increments are those that 608Fh states; ten thousand were 839 times as large."""
+    case = next(case_of(n) for n in range(22) if case_of(n).kind == "608Fh alone")
+    device = make_device(case.drive, case.spec)
+    assert isinstance(device, VirtualServo)
+    turn = device.core.units.position_per_rad * 2 * np.pi
+    assert turn == pytest.approx(device.od.number("608F:01"))
+
+
+def test_a_belt_that_slips_is_in_the_truth() -> None:
+    """k·φ with φ' = w1 - w2 - φ·slip: far below the slip's corner the belt is a damper k/slip."""
+    rough = RoughTorqueSpec(slip_per_s=20.0)
+    spec = mechanics((1e-4, 20.0, 0.0), viscous=0.0)
+    f = np.array([0.02, 500.0])
+    s = 2j * np.pi * f
+    true = analytic_response(spec.model_copy(update={"rough_torque": rough}), f)
+    damper = 20.0 / 20.0 * s * 1e-4 / (20.0 / 20.0 + s * 1e-4)
+    assert 1.0 / true[0] == pytest.approx((s * spec.motor.inertia_kgm2 + damper)[0], rel=0.01)
+    assert true[1] == pytest.approx(analytic_response(spec, f)[1], rel=0.01)
 
 
 async def test_a_filtered_torque_is_recognised_on_a_drive() -> None:

@@ -11,6 +11,7 @@ from drivers.virtual.firmware.objects.settings import GainSet, LoopSettings
 from drivers.virtual.mechanics import (
     EncoderSpec,
     FrictionSpec,
+    LoadSpec,
     MechanicsSpec,
     MotorSpec,
     RoughTorqueSpec,
@@ -104,3 +105,28 @@ def test_a_longer_loop_period_changes_the_torque_once_in_it() -> None:
     shown = reported(axis, 30)
     changes = np.flatnonzero(np.diff(shown)) + 1
     assert np.all(np.diff(changes) == 5)
+
+
+@pytest.mark.parametrize("loads", [1, 2, 3])
+def test_a_stiffness_that_varies_by_place_twists_both_sides(loads: int) -> None:
+    """Without torque from outside the angular momentum of the whole axis stays."""
+    load = LoadSpec(inertia_kgm2=2e-4, stiffness_nm_per_rad=30.0)
+    spec = MechanicsSpec(
+        motor=MOTOR,
+        load=(load,) * loads,
+        friction=FrictionSpec(coulomb_nm=0.0, viscous_nms=0.0),
+        encoder=EncoderSpec(),
+        rough_torque=RoughTorqueSpec(stiffness_share=0.4),
+    )
+    axis = VirtualAxis(spec)
+    speeds = [1, *range(4, 4 + 2 * loads, 2)]
+    inertias = np.array([1e-4] + [2e-4] * loads)
+    axis._x[1] = 60.0
+    axis._x[3] = 0.05
+    before = float(np.sum(inertias * axis._x[speeds]))
+    twists = []
+    for _ in range(400):
+        axis.run(5)
+        twists.append(float(axis._x[3]))
+    assert np.ptp(twists) > 0.05
+    assert float(np.sum(inertias * axis._x[speeds])) == pytest.approx(before, rel=1e-3)

@@ -90,8 +90,8 @@ P_BRAKE_STIFFNESS, P_BRAKE_DAMPING = range(P_NOTCHES + 49, P_NOTCHES + 51)
     P_COMMUTATION_SENSE,
     P_ENCODER_SENSE,
 ) = range(P_NOTCHES + 51, P_NOTCHES + 57)
-P_LOAD_COULOMB = P_NOTCHES + 57
-P_SIZE = P_NOTCHES + 58
+P_LOAD_COULOMB, P_ROUGH_FIRST_INERTIA = range(P_NOTCHES + 57, P_NOTCHES + 59)
+P_SIZE = P_NOTCHES + 59
 
 # --- state ----------------------------------------------------------------------------------
 (

@@ -65,8 +65,11 @@ def rough_machine(p, s, x, b):  # type: ignore[no-untyped-def]
     if size > 3 and p[k.P_ROUGH_STIFFNESS] > 0.0:
         twist = p[k.P_ROUGH_STIFFNESS] * math.sin(p[k.P_ROUGH_STIFF_PER_REV] * angle) * x[3]
         motor -= twist
+        # What the motor takes the first load gets.
         if size == 5:
             last = twist
+        else:
+            x[4] += k.STEP_S / p[k.P_ROUGH_FIRST_INERTIA] * twist
     for i in range(size):
         x[i] += b[0, i, 1] * motor + b[0, i, 2] * last
     if size > 3:
