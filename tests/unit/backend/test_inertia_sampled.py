@@ -43,8 +43,9 @@ def moved(loop_1_s: float, held: bool, *, offset: bool = False) -> Recording:
             position += 0.5 * step_s * (before + speed)
         rows.append((position, speed, torque))
     p, v, t = np.array(rows).T
-    raw = 4000.0 * wanted[1:]
-    return Recording(RATE, p, v, t, raw, 1270.0 * ahead[1:], np.ones(p.size, np.bool_))
+    raw = np.asarray(4000.0 * wanted[1:], np.float64)
+    sent = np.asarray(1270.0 * ahead[1:], np.float64)
+    return Recording(RATE, p, v, t, raw, sent, np.ones(p.size, np.bool_))
 
 
 def found(recording: Recording) -> InertiaResult:
