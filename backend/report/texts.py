@@ -137,15 +137,15 @@ TEXTS: dict[str, tuple[str, str]] = {
         "所有穿越频率均在所测频段内。",
     ),
     "verdict.coverage.gain_steps": (
-        "The loop may cross 0 dB up to {last}, above the measured band: it was stable with {gain} "
+        "The loop may cross 0 dB up to {last}, outside the measured band: it was stable with {gain} "
         "more gain, which bounds the margins there.",
-        "环路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，"
+        "环路最高可能在 {last} 穿越 0 dB，超出所测频段：增益提高 {gain} 时仍稳定，"
         "由此限定该处的裕度。",
     ),
     "verdict.coverage.predicted": (
-        "The loop may cross 0 dB up to {last}, above the measured band: its margins there are "
+        "The loop may cross 0 dB up to {last}, outside the measured band: its margins there are "
         "predicted only.",
-        "环路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。",
+        "环路最高可能在 {last} 穿越 0 dB，超出所测频段：该处的裕度仅为预测。",
     ),
     "loop.rule": (
         "Sound: phase margin 45° or more, gain margin 8 dB or more, Ms below 2. "

@@ -75,7 +75,7 @@ class LoopVerdict:
 
     ``predicted`` covers what lies above the band and, where the lines begin above a crossover, what
     lies below it. ``last_crossover_hz`` is the highest crossover of all possible loops.
-    ``uncovered`` is a crossover that no line covers, and the end of the band next to it [Hz].
+    ``uncovered_hz`` is a crossover that no line covers, and the end of the band next to it [Hz].
     ``coverage``: all crossings are measured; or the others are bounded by a measurement with the
     gain raised by ``shown_gain_db``; or they are only predicted, with which no design is kept.
     ``stated`` are the worst figures of both bands, ``worst`` the ends of their intervals; 60 dB
@@ -97,7 +97,7 @@ class LoopVerdict:
     gain_db: Interval
     contradicted: bool = False
     designed: BandVerdict | None = None
-    uncovered: tuple[float, float] | None = None
+    uncovered_hz: tuple[float, float] | None = None
 
     def missed(
         self, guaranteed: Goals, margin_deg: float, margin_db: float, ms_ratio: float
@@ -113,8 +113,8 @@ class LoopVerdict:
             found.append(Missed("contradiction", self.shown_gain_db or 0.0, 0.0))
         if not self.stable:
             found.append(Missed("stability", 0.0, 1.0))
-        if self.coverage == "predicted" and self.uncovered is not None:
-            found.append(Missed("coverage", *self.uncovered))
+        if self.coverage == "predicted" and self.uncovered_hz is not None:
+            found.append(Missed("coverage", *self.uncovered_hz))
         pairs: tuple[tuple[Missing, float, float, float], ...] = (
             ("phase_margin", self.stated.phase_margin_deg, guaranteed.phase_margin_deg, margin_deg),
             ("gain_margin", self.stated.gain_margin_db, guaranteed.gain_margin_db, margin_db),
@@ -195,7 +195,7 @@ def judge(
         contradicted = not left.size
         possible = possible if contradicted else left
     gap = _gap(lines if seen is not None else None, frequency_hz, possible)
-    coverage: Coverage = "measured" if gap.uncovered is None else "predicted"
+    coverage: Coverage = "measured" if gap.uncovered_hz is None else "predicted"
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
     nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
@@ -210,7 +210,7 @@ def judge(
     stated, worst = _worst(seen, beyond)
     return LoopVerdict(
         seen, beyond, gap.last_hz, coverage, shown_gain_db, stated, worst, sound,
-        delay, _in_db(gain), contradicted, designed, gap.uncovered,
+        delay, _in_db(gain), contradicted, designed, gap.uncovered_hz,
     )  # fmt: skip
 
 
@@ -219,14 +219,14 @@ class _Gap:
     """What the lines do not cover: the dense grid up to ``below`` and from ``above`` on.
 
     ``below`` and ``above`` are indices, ``below`` 0 where nothing is open there. ``top_hz`` is the
-    end of the measured band, ``last_hz`` the highest crossover, ``uncovered`` as in `LoopVerdict`.
+    end of the measured band, ``last_hz`` the highest crossover, ``uncovered_hz`` as in `LoopVerdict`.
     """
 
     below: int
     above: int
     top_hz: float
     last_hz: float
-    uncovered: tuple[float, float] | None
+    uncovered_hz: tuple[float, float] | None
 
 
 def _gap(lines: Lines | None, frequency_hz: FloatArray, possible: ComplexArray) -> _Gap:
@@ -242,17 +242,17 @@ def _gap(lines: Lines | None, frequency_hz: FloatArray, possible: ComplexArray) 
     # The segment that the end of the band lies in belongs to both: no crossover is between them.
     below = 0
     above = max(int(np.searchsorted(frequency_hz, top, "right")) - 1, 0)
-    uncovered = (last, top) if last > top else None
+    uncovered_hz = (last, top) if last > top else None
     if at.size and not _amplifies(lines.closed[0]):
         # Above all crossovers, or below one that an integral part has: it lies below the lines.
         below = int(np.searchsorted(frequency_hz, low)) + 1
-        uncovered = uncovered or (min(first, low), low)
+        uncovered_hz = uncovered_hz or (min(first, low), low)
     if at.size and _amplifies(lines.closed[-1]):
         # The loop crosses above the lines, also where the prediction does before their end.
         each = crosses[np.any(crosses, axis=1)]
         above = min(above, int(np.min(each.shape[1] - 1 - np.argmax(each[:, ::-1], axis=1))))
-        uncovered = uncovered or (max(last, top), top)
-    return _Gap(below, above, top, last, uncovered)
+        uncovered_hz = uncovered_hz or (max(last, top), top)
+    return _Gap(below, above, top, last, uncovered_hz)
 
 
 def _amplifies(closed: complex) -> bool:

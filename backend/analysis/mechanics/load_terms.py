@@ -96,7 +96,9 @@ class Terms:
         """Return whether the term added to ``before`` is also accepted near the noise level."""
         if self.static_rad_s != before.static_rad_s:
             return False
-        if self.rests_rad != before.rests_rad or self.cranks_rad != before.cranks_rad:
+        if self.rests_rad != before.rests_rad:
+            return False  # next to a load that oscillates, it could be viscous friction
+        if self.cranks_rad != before.cranks_rad:
             return True
         return self.periods_rad == before.periods_rad or self.periods_rad[-1] > COGGING_RAD
 

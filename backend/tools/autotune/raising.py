@@ -15,7 +15,7 @@ from drivers.texts.message import Text, text
 
 
 def by_raised_gain(missed: Missed) -> bool:
-    """Whether raising the gain can still verify it: anything above the measured band."""
+    """Whether raising the gain can still verify it: anything outside the measured band."""
     return missed.what == "coverage" or missed.end == "predicted"
 
 
@@ -66,7 +66,7 @@ def not_shown(
     said = in_words(misses(verdict, guaranteed))
     wanted = wanted_db(missed, guaranteed)
     if shown.shown_db < wanted - MARGIN_DB:
-        crossover_hz, end_hz = verdict.uncovered or (verdict.last_crossover_hz, 0.0)
+        crossover_hz, end_hz = verdict.uncovered_hz or (verdict.last_crossover_hz, 0.0)
         gains = {"shown_db": shown.shown_db, "wanted_db": wanted}
         if end_hz == 0.0:
             code = "autotune.crossover-unmeasured-not-shown"

@@ -113,6 +113,8 @@ class VerdictInfo(_Part):
     gain_db: IntervalInfo
     contradicted: bool
     designed: BandInfo | None
+    uncovered_hz: tuple[float, float] | None = None
+    """A crossover that no measured line covers, and the end of the measured band next to it."""
 
 
 class GainStepInfo(_Part):

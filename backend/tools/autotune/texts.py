@@ -66,12 +66,12 @@ TEXTS: dict[str, tuple[str, str]] = {
         "所有穿越频率都在测量频段内",
     ),
     "coverage.gain_steps": (
-        "above the measured band bounded by a raised gain",
-        "测量频段以上由提高增益的试验限定",
+        "outside the measured band bounded by a raised gain",
+        "测量频段以外由提高增益的试验限定",
     ),
     "coverage.predicted": (
-        "above the measured band predicted only",
-        "测量频段以上仅为预测",
+        "outside the measured band predicted only",
+        "测量频段以外仅为预测",
     ),
 }
 

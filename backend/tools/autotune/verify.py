@@ -321,9 +321,9 @@ def unseen(last_hz: float | None, verified: Verified) -> Text | None:
     verdict = verified.verdict
     if verdict is not None:
         gain_db = verdict.shown_gain_db
-        if verdict.coverage != "gain_steps" or gain_db is None or verdict.uncovered is None:
+        if verdict.coverage != "gain_steps" or gain_db is None or verdict.uncovered_hz is None:
             return None
-        crossover_hz, end_hz = verdict.uncovered
+        crossover_hz, end_hz = verdict.uncovered_hz
         if end_hz == 0.0:
             code = "autotune.margins-bounded-unmeasured"
             return text(code, crossover_hz=crossover_hz, gain_db=gain_db)

@@ -109,7 +109,7 @@ def test_a_crossover_below_the_band_is_not_measured() -> None:
     assert found.coverage == "predicted"
     assert found.measured is not None
     assert found.measured.phase_margin_deg is None
-    assert found.uncovered == pytest.approx((4.0, 5.0), rel=0.1)
+    assert found.uncovered_hz == pytest.approx((4.0, 5.0), rel=0.1)
     assert [m.what for m in found.missed(Goals(9.0, 48.0, 1.8), 1.0, 1.0, 1.03)] == ["coverage"]
     true_deg = 90 - 360 * 4.0 * 20e-3
     assert found.stated.phase_margin_deg == pytest.approx(true_deg, abs=1.0)
@@ -141,7 +141,7 @@ def test_a_crossover_that_was_predicted_below_the_end_of_the_band_is_not_lost() 
     nominal = loop_of(DENSE, 100.0, 1e-3)
     found = judge(lines, DENSE, nominal[None, :], nominal, late_s=(0.0, 5e-6), size=(0.0, 0.001))
     assert found.coverage == "predicted"
-    assert found.uncovered == pytest.approx((105.0, 104.0), rel=0.02)
+    assert found.uncovered_hz == pytest.approx((105.0, 104.0), rel=0.02)
     assert found.stated.phase_margin_deg == pytest.approx(54.0, abs=2.0)
     assert found.worst.phase_margin_deg < 52.0
 

@@ -242,7 +242,7 @@ def test_values_come_as_json_and_with_their_unit() -> None:
     ]
     out = io.StringIO()
     with redirect_stdout(out):
-        assert not show_readings(read, as_json=True)
+        assert not show_readings(read, "mms7", as_json=True)
     shown = json.loads(out.getvalue())
     assert (shown[0]["value"], shown[0]["unit"], shown[0]["raw"]) == (150.0, "Hz", 1500)
     assert (shown[2]["value"], shown[2]["error"]) == (None, "no answer")

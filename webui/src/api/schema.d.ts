@@ -13567,6 +13567,11 @@ export interface components {
             /** Stable */
             stable: boolean;
             stated: components["schemas"]["GoalsInfo"];
+            /** Uncovered Hz */
+            uncovered_hz?: [
+                number,
+                number
+            ] | null;
             worst: components["schemas"]["GoalsInfo"];
         };
         /**

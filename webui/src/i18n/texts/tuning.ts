@@ -614,12 +614,12 @@ export const tuning = {
     '所有穿越频率均在所测频段内。',
   ],
   'verdict.coverage.gain_steps': [
-    'The loop may cross 0 dB up to {last}, above the measured band: it was stable with {gain} more gain, which limits the uncertainty there.',
-    '环路最高可能在 {last} 穿越 0 dB，高于所测频段：增益提高 {gain} 时仍稳定，由此限定该处的不确定度。',
+    'The loop may cross 0 dB up to {last}, outside the measured band: it was stable with {gain} more gain, which limits the uncertainty there.',
+    '环路最高可能在 {last} 穿越 0 dB，超出所测频段：增益提高 {gain} 时仍稳定，由此限定该处的不确定度。',
   ],
   'verdict.coverage.predicted': [
-    'The loop may cross 0 dB up to {last}, above the measured band: the margins there are only predicted.',
-    '环路最高可能在 {last} 穿越 0 dB，高于所测频段：该处的裕度仅为预测。',
+    'The loop may cross 0 dB up to {last}, outside the measured band: the margins there are only predicted.',
+    '环路最高可能在 {last} 穿越 0 dB，超出所测频段：该处的裕度仅为预测。',
   ],
   'autotune.bandwidths': [
     'Bandwidth: {predicted} predicted, {measured} measured.',
