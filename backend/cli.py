@@ -174,7 +174,7 @@ COMMANDS = {
     ),
     "latency": (
         "server.latency:latency_command",
-        "Show for how long a serial adapter holds answers back; change it only with --set or --undo.",
+        "For how long a serial adapter holds answers back; lower it with --set.",
     ),
 }
 """Name of a command to where it is, below `backend.commands`, and what the list says of it."""

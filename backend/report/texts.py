@@ -137,8 +137,8 @@ TEXTS: dict[str, tuple[str, str]] = {
         "所有穿越频率均在所测频段内。",
     ),
     "verdict.coverage.gain_steps": (
-        "The loop may cross 0 dB up to {last}, outside the measured band: it was stable with {gain} "
-        "more gain, which bounds the margins there.",
+        "The loop may cross 0 dB up to {last}, outside the measured band: it was stable with "
+        "{gain} more gain, which bounds the margins there.",
         "环路最高可能在 {last} 穿越 0 dB，超出所测频段：增益提高 {gain} 时仍稳定，"
         "由此限定该处的裕度。",
     ),

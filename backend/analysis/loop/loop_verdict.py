@@ -219,7 +219,8 @@ class _Gap:
     """What the lines do not cover: the dense grid up to ``below`` and from ``above`` on.
 
     ``below`` and ``above`` are indices, ``below`` 0 where nothing is open there. ``top_hz`` is the
-    end of the measured band, ``last_hz`` the highest crossover, ``uncovered_hz`` as in `LoopVerdict`.
+    end of the measured band, ``last_hz`` the highest crossover; ``uncovered_hz`` as in
+    `LoopVerdict`.
     """
 
     below: int

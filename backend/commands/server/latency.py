@@ -33,7 +33,7 @@ def latency_command(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     config: Annotated[Path | None, typer.Option(help="state folder of the station")] = None,
 ) -> None:
-    """Show for how long a serial adapter holds answers back; change it only with --set or --undo.
+    """For how long a serial adapter holds answers back; lower it with --set.
 
     On Windows a change restarts the adapter: end every program that uses the port first.
     """

@@ -246,7 +246,7 @@ def test_values_come_as_json_and_with_their_unit() -> None:
     shown = json.loads(out.getvalue())
     assert (shown[0]["value"], shown[0]["unit"], shown[0]["raw"]) == (150.0, "Hz", 1500)
     assert (shown[2]["value"], shown[2]["error"]) == (None, "no answer")
-    assert line(status, read[1][1]) == "6041:00  Status word = 592 (0x0250)"
+    assert line(status, read[1][1], "mms7") == "6041:00  Status word = 592 (0x0250)"
 
 
 @pytest.mark.parametrize(

@@ -83,9 +83,7 @@ describe('an import', () => {
   }
 
   it('sends nothing of fields that are not there any more', async () => {
-    serve(({ path }) =>
-      path.includes('/preview') ? (found) : { file: 'a.sdmeas' },
-    )
+    serve(({ path }) => (path.includes('/preview') ? found : { file: 'a.sdmeas' }))
     const page = new Page(createElement(ImportPanel, { onStored: () => {} }))
     await page.after(() => press(page.one('FileButton'), 'onChange', new File(['1'], 'a.csv')))
     await page.after(() => type(page.named('NativeSelect', 'Time'), ''))

@@ -9,16 +9,15 @@ import { merged, type Notches, useNotches } from './useNotches'
 
 vi.mock('@mantine/core', () => import('../../testing/mantine'))
 
-const slot = (number: number, center_hz: number | null): NotchSlotInfo =>
-  ({
-    slot: number,
-    enabled: center_hz !== null,
-    notch: center_hz === null ? null : { center_hz, width_hz: 100, depth_db: -20 },
-    realised: null,
-    raw: {},
-    note: '',
-    note_message: null,
-  })
+const slot = (number: number, center_hz: number | null): NotchSlotInfo => ({
+  slot: number,
+  enabled: center_hz !== null,
+  notch: center_hz === null ? null : { center_hz, width_hz: 100, depth_db: -20 },
+  realised: null,
+  raw: {},
+  note: '',
+  note_message: null,
+})
 const shape = (center_hz: number) => ({ center_hz, width_hz: 100, depth_db: -20 })
 const LINES = [10, 20]
 let slots: NotchSlotInfo[] = []
