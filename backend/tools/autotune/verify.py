@@ -351,9 +351,14 @@ def hum(step: step_evaluation.StepResult) -> Text | None:
 
 
 def hum_percent_of(step: step_evaluation.StepResult) -> float:
-    """RMS of the torque before the step, without its mean, in % of rated torque."""
-    before = step.torque_percent[step.time_s < 0.8 * step_evaluation.LEAD_S]
-    return float(np.std(before))
+    """RMS of the torque before the step, without its mean, in % of rated torque.
+
+    Of the samples that were received: interpolated ones do not oscillate.
+    """
+    before = step.time_s < 0.8 * step_evaluation.LEAD_S
+    if step.valid is not None and np.any(before & step.valid):
+        before &= step.valid
+    return float(np.std(step.torque_percent[before]))
 
 
 def _named(candidate: Candidate, missed: Sequence[Text]) -> Text | None:

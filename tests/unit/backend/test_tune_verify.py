@@ -54,6 +54,17 @@ def test_a_standing_axis_must_be_quiet(noise_percent: float, hums: bool) -> None
         assert found.params["rms_percent"] == pytest.approx(6.0, rel=0.2)
 
 
+def test_samples_that_were_not_received_do_not_calm_it() -> None:
+    """Half of the samples before the step are interpolated between two that agree."""
+    whole = step(6.0)
+    valid = np.ones(whole.time_s.size, bool)
+    valid[:40] = False
+    torque = np.where(valid, whole.torque_percent, 0.0)
+    found = hum(replace(whole, torque_percent=torque, valid=valid))
+    assert found is not None
+    assert found.params["rms_percent"] == pytest.approx(6.0, rel=0.3)
+
+
 def test_margins_as_promised_are_kept() -> None:
     assert not worse_than(GUARANTEED, {"ms": 1.8, "phase_margin_deg": 48.0, "gain_margin_db": 9.0})
     # No crossing within the band is no lack of a margin.
