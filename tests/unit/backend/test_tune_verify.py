@@ -62,7 +62,7 @@ def test_samples_that_were_not_received_do_not_calm_it() -> None:
     torque = np.where(valid, whole.torque_percent, 0.0)
     found = hum(replace(whole, torque_percent=torque, valid=valid))
     assert found is not None
-    assert found.params["rms_percent"] == pytest.approx(6.0, rel=0.3)
+    assert found.params["rms_percent"] == pytest.approx(6.0, rel=0.2)
 
 
 def test_margins_as_promised_are_kept() -> None:
