@@ -1,24 +1,22 @@
-import { asked, serve } from '../../testing/bench'
-import { createElement } from 'react'
-import { beforeEach, describe, expect, it, vi } from 'vitest'
+// @vitest-environment happy-dom
+import { asked, serve, settled, shown, type } from '../../testing/page'
+import { screen } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
+import { beforeEach, describe, expect, it } from 'vitest'
 import type { NotchSlotInfo } from '../../api/schema'
 import { setLink } from '../../live/store'
-import { Page, press, type } from '../../testing/render'
 import { NotchEditor } from './NotchEditor'
 import { merged, type Notches, useNotches } from './useNotches'
 
-vi.mock('@mantine/core', () => import('../../testing/mantine'))
-
-const slot = (number: number, center_hz: number | null): NotchSlotInfo =>
-  ({
-    slot: number,
-    enabled: center_hz !== null,
-    notch: center_hz === null ? null : { center_hz, width_hz: 100, depth_db: -20 },
-    realised: null,
-    raw: {},
-    note: '',
-    note_message: null,
-  })
+const slot = (number: number, center_hz: number | null): NotchSlotInfo => ({
+  slot: number,
+  enabled: center_hz !== null,
+  notch: center_hz === null ? null : { center_hz, width_hz: 100, depth_db: -20 },
+  realised: null,
+  raw: {},
+  note: '',
+  note_message: null,
+})
 const shape = (center_hz: number) => ({ center_hz, width_hz: 100, depth_db: -20 })
 const LINES = [10, 20]
 let slots: NotchSlotInfo[] = []
@@ -26,16 +24,16 @@ let notches: Notches
 
 function Editor() {
   notches = useNotches('x', LINES)
-  return createElement(NotchEditor, { drive: 'x', notches })
+  return <NotchEditor drive="x" notches={notches} />
 }
 const connected = (open: boolean) => setLink({ open, attempt: 0, roundTripMs: null }, 0)
-const settled = () => new Promise((resolve) => setTimeout(resolve, 300))
+/** Longer than the editor waits before it asks what the drive would make of the notches. */
+const PREVIEWED_MS = 300
 const opened = async () => {
-  const page = new Page(createElement(Editor))
-  await page.after()
-  await settled()
-  return page.after()
+  await shown(<Editor />)
+  await settled(() => {}, PREVIEWED_MS)
 }
+const field = (name: string) => screen.getByRole<HTMLInputElement>('textbox', { name })
 
 beforeEach(() => {
   connected(true)
@@ -64,32 +62,31 @@ describe('notches that were edited', () => {
   })
 
   it('outlive a lost connection', async () => {
-    const page = await opened()
-    await page.after(() => notches.set(0, shape(520)))
-    await page.after(() => connected(false))
-    await page.after(() => connected(true))
+    await opened()
+    await settled(() => notches.set(0, shape(520)))
+    await settled(() => connected(false))
+    await settled(() => connected(true))
     expect(notches.wanted[0]).toEqual(shape(520))
     expect(notches.edited).toBe(true)
-    await page.after(() => press(page.named('Button', 'Read them again')))
+    await userEvent.click(screen.getByRole('button', { name: 'Read them again' }))
+    await settled()
     expect(notches.wanted[0]).toEqual(shape(400))
-    page.end()
   })
 
   it('are not written while a field has no number', async () => {
-    const page = await opened()
-    const write = () => page.named('Button', 'Write the notches').props.disabled
-    await page.after(() => type(page.named('TextInput', 'Width (−3 dB)'), '120'))
-    await settled()
-    await page.after()
+    await opened()
+    const write = () =>
+      screen.getByRole<HTMLButtonElement>('button', { name: 'Write the notches' }).disabled
+    await type(field('Width (−3 dB)'), '120')
+    await settled(() => {}, PREVIEWED_MS)
     expect(write()).toBe(false)
-    await page.after(() => type(page.named('TextInput', 'Centre'), '5OO'))
-    expect(page.named('TextInput', 'Centre').props.value).toBe('5OO')
+    await type(field('Centre'), '5OO')
+    expect(field('Centre').value).toBe('5OO')
     expect(write()).toBe(true)
     // Moved on the plot, the notch has a number again, and the field shows it.
-    await page.after(() => notches.set(0, { ...shape(480), width_hz: 120 }))
-    expect(page.named('TextInput', 'Centre').props.value).toBe('480')
+    await settled(() => notches.set(0, { ...shape(480), width_hz: 120 }))
+    expect(field('Centre').value).toBe('480')
     expect(write()).toBe(false)
     expect(asked.some((each) => each.method === 'PUT')).toBe(false)
-    page.end()
   })
 })
