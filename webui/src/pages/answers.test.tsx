@@ -1,6 +1,6 @@
 // @vitest-environment happy-dom
 import { asked, later, serve, settled, shown, type } from '../testing/page'
-import { fireEvent, renderHook, screen } from '@testing-library/react'
+import { fireEvent, renderHook, screen, waitFor } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it } from 'vitest'
 import type { DriveSummary, InvitationView, JobInfo } from '../api/schema'
@@ -19,8 +19,6 @@ import { MyAccess } from './people/MyAccess'
 
 const drive = { id: 'x', name: 'X', profile: 'p', unsaved: 0, pending: 0 } as DriveSummary
 const press = (name: string) => userEvent.click(screen.getByRole('button', { name }))
-/** As long as a search waits for more to be typed. */
-const TYPED_MS = 200
 
 beforeEach(() => {
   setLink({ open: true, attempt: 0, roundTripMs: null }, 0)
@@ -71,11 +69,10 @@ describe('an answer that was overtaken', () => {
     const library = renderHook((filters: Filters) => useLibrary(filters), {
       initialProps: { ...NO_FILTERS, words: 'a' },
     })
-    await settled(() => {}, TYPED_MS)
+    await waitFor(() => expect(asked.some(({ path }) => /words=a(&|$)/.test(path))).toBe(true))
     library.rerender({ ...NO_FILTERS, words: 'ab' })
-    await settled(() => {}, TYPED_MS)
+    await waitFor(() => expect(library.result.current.entries).toEqual([{ id: 'ab' }]))
     await settled(() => slow.give(entries('a')))
-    expect(asked.some(({ path }) => /words=a(&|$)/.test(path))).toBe(true)
     expect(library.result.current.entries).toEqual([{ id: 'ab' }])
   })
 

@@ -4,7 +4,7 @@
  * with `// @vitest-environment happy-dom`.
  */
 import { MantineProvider } from '@mantine/core'
-import { act, cleanup, render, type RenderResult } from '@testing-library/react'
+import { act, cleanup, configure, render, type RenderResult } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import type { ReactElement, ReactNode } from 'react'
 import { afterEach } from 'vitest'
@@ -116,6 +116,8 @@ Object.assign(globalThis, {
 })
 HTMLCanvasElement.prototype.getContext = surface as never
 afterEach(cleanup)
+// What a form waits for until it asks takes longer on a busy machine.
+configure({ asyncUtilTimeout: 20_000 })
 
 /** A component in the library's provider, as the page has it, but without transitions. */
 function Provided({ children }: { children: ReactNode }) {
@@ -133,11 +135,14 @@ export async function shown(element: ReactElement): Promise<RenderResult> {
   return result
 }
 
+/** Turns of the event loop that an answer may take until it is shown. */
+const TURNS = 5
+
 /** Do something that comes from elsewhere than a person, and wait for what follows from it. */
-export const settled = (work: () => unknown = () => {}, ms = 0): Promise<void> =>
+export const settled = (work: () => unknown = () => {}): Promise<void> =>
   act(async () => {
     await work()
-    await new Promise((resolve) => setTimeout(resolve, ms))
+    for (let turn = 0; turn < TURNS; turn++) await new Promise((resolve) => setTimeout(resolve))
   })
 
 /** Replace the text of a field. */

@@ -1,6 +1,6 @@
 // @vitest-environment happy-dom
-import { asked, serve, settled, shown, type } from '../../testing/page'
-import { screen } from '@testing-library/react'
+import { asked, sent, serve, settled, shown, type } from '../../testing/page'
+import { screen, waitFor } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it } from 'vitest'
 import type { NotchSlotInfo } from '../../api/schema'
@@ -27,11 +27,11 @@ function Editor() {
   return <NotchEditor drive="x" notches={notches} />
 }
 const connected = (open: boolean) => setLink({ open, attempt: 0, roundTripMs: null }, 0)
-/** Longer than the editor waits before it asks what the drive would make of the notches. */
-const PREVIEWED_MS = 300
 const opened = async () => {
   await shown(<Editor />)
-  await settled(() => {}, PREVIEWED_MS)
+  // The editor waits before it asks what the drive would make of the notches.
+  await waitFor(() => expect(sent('/preview')).toBeDefined())
+  await settled()
 }
 const field = (name: string) => screen.getByRole<HTMLInputElement>('textbox', { name })
 
@@ -78,8 +78,7 @@ describe('notches that were edited', () => {
     const write = () =>
       screen.getByRole<HTMLButtonElement>('button', { name: 'Write the notches' }).disabled
     await type(field('Width (−3 dB)'), '120')
-    await settled(() => {}, PREVIEWED_MS)
-    expect(write()).toBe(false)
+    await waitFor(() => expect(write()).toBe(false))
     await type(field('Centre'), '5OO')
     expect(field('Centre').value).toBe('5OO')
     expect(write()).toBe(true)
