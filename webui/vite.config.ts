@@ -33,10 +33,16 @@ export default defineConfig({
   },
   worker: { format: 'es' },
   server: {
+    // The texts of the catalogue stand beside this directory.
+    fs: { allow: ['.', '../drivers/texts/catalogue'] },
     proxy: {
       '/api': { target: process.env.SERVODECK_SERVER ?? 'http://127.0.0.1:8000', ws: true },
       '/rerun': { target: process.env.SERVODECK_SERVER ?? 'http://127.0.0.1:8000', ws: true },
     },
   },
-  test: { environment: 'node', include: ['src/**/*.test.{ts,tsx}'] },
+  test: {
+    environment: 'node',
+    include: ['src/**/*.test.{ts,tsx}'],
+    testTimeout: 60_000, // some show whole pages, also on a busy machine
+  },
 })

@@ -1,4 +1,5 @@
-import { answers, posted, requests } from '../testing/browser'
+// @vitest-environment happy-dom
+import { posted, serve } from '../testing/page'
 import { afterEach, beforeEach, expect, it, vi } from 'vitest'
 import type { StopResult } from '../api/schema'
 import { contents, publish, setLink } from '../live/store'
@@ -6,14 +7,14 @@ import { currentReport, dismissReport, listenForAnswers, stopEverything } from '
 
 const RESULT = { stopped: ['x'], failed: {}, axes: [] } as unknown as StopResult
 /** A network that swallows everything: neither an answer nor an error. */
-const swallowed = () => new Promise(() => {})
+const swallowed = () => new Promise<never>(() => {})
+const stop = (answer: () => Promise<never> | StopResult) =>
+  serve(({ method, path }) => (method === 'POST' && path === '/stop' ? answer() : 404))
 const link = (open: boolean) => setLink({ open, attempt: open ? 0 : 1, roundTripMs: null }, 0)
 
 listenForAnswers()
 beforeEach(() => {
   vi.useFakeTimers()
-  answers.splice(0)
-  requests.splice(0)
   posted.splice(0)
   dismissReport()
   link(true)
@@ -21,14 +22,14 @@ beforeEach(() => {
 afterEach(() => vi.useRealTimers())
 
 it('goes both ways, and states what it reached', async () => {
-  answers.push({ method: 'POST', path: /\/stop$/, give: () => RESULT })
+  stop(() => RESULT)
   await stopEverything()
   expect(posted).toContainEqual({ kind: 'send', message: { type: 'stop', drive: null } })
   expect(currentReport()).toMatchObject({ answer: RESULT, failure: null })
 })
 
 it('sends to the emergency stop when nothing says that it has gone out', () => {
-  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  stop(swallowed)
   void stopEverything()
   vi.advanceTimersByTime(1000)
   expect(currentReport()?.failure).toBeNull()
@@ -37,7 +38,7 @@ it('sends to the emergency stop when nothing says that it has gone out', () => {
 })
 
 it('takes that back when the server says that it has gone out after all', () => {
-  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  stop(swallowed)
   void stopEverything()
   vi.advanceTimersByTime(4000)
   publish('stopTaken')
@@ -45,7 +46,7 @@ it('takes that back when the server says that it has gone out after all', () => 
 })
 
 it('sends to the emergency stop when the connection goes before the axes are seen to stand', () => {
-  answers.push({ method: 'POST', path: /\/stop$/, give: swallowed })
+  stop(swallowed)
   void stopEverything()
   publish('stopTaken')
   vi.advanceTimersByTime(500)
@@ -59,12 +60,12 @@ it('sends to the emergency stop when the connection goes before the axes are see
 })
 
 it('does not report on a STOP that was answered or put away', async () => {
-  answers.push({ method: 'POST', path: /\/stop$/, give: () => RESULT })
+  stop(() => RESULT)
   await stopEverything()
   vi.advanceTimersByTime(10_000)
   link(false)
   expect(currentReport()?.failure).toBeNull()
-  answers.splice(0, 1, { method: 'POST', path: /\/stop$/, give: swallowed })
+  stop(swallowed)
   void stopEverything()
   dismissReport()
   vi.advanceTimersByTime(10_000)

@@ -10,7 +10,6 @@ export function NumberField({
   value,
   onChange,
   onWrong,
-  onInvalid,
   min,
   max,
   above,
@@ -24,10 +23,11 @@ export function NumberField({
   unit?: string
   value: number | null
   onChange: (value: number | null) => void
-  /** Whether it holds something that is not allowed, and not just nothing. */
+  /**
+   * Whether it holds something that is not allowed, and not just nothing. An optional field needs
+   * it: its value is null in both cases.
+   */
   onWrong?: (wrong: boolean) => void
-  /** Instead of `onChange`, for a text that is no valid number. Null is then an empty field only. */
-  onInvalid?: () => void
   min?: number
   max?: number
   /** Exclusive lower limit. */
@@ -41,16 +41,20 @@ export function NumberField({
 }) {
   const t = useT()
   const [text, setText] = useState(value === null ? '' : String(value))
-  const tell = useRef(onWrong)
-  tell.current = onWrong
+  const report = useRef(onWrong)
+  report.current = onWrong
+  /** The value that the text stands for. */
+  const known = useRef(value)
   useEffect(() => {
     // A value set from elsewhere replaces the text; one's own typing is left as typed.
-    if (value === null || Number.isNaN(value) || toNumber(text) === value) return
-    setText(String(value))
-    tell.current?.(false)
+    if (value === known.current) return
+    known.current = value
+    if (value !== null && toNumber(text) === value) return
+    setText(value === null ? '' : String(value))
+    report.current?.(false)
   }, [value])
   // What was typed goes with the field.
-  useEffect(() => () => tell.current?.(false), [])
+  useEffect(() => () => report.current?.(false), [])
   // An empty form is not a mistake yet; a field that was emptied or left empty is.
   const [touched, setTouched] = useState(false)
   const bounds = { min, max, above, below, integer }
@@ -80,8 +84,8 @@ export function NumberField({
         setText(event.currentTarget.value)
         const next = event.currentTarget.value
         const wrong = next.trim() !== '' && faultOf(next, bounds) !== null
-        if (wrong && onInvalid) onInvalid()
-        else onChange(wrong ? null : toNumber(next))
+        known.current = wrong ? null : toNumber(next)
+        onChange(known.current)
         onWrong?.(wrong)
       }}
     />

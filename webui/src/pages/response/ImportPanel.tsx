@@ -9,6 +9,7 @@ import { NumberField } from '../../widgets/NumberField'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { useWrong, type Wrong } from '../../widgets/useWrong'
 import { TRACE_COLORS } from '../scope/channels'
 import {
   guessed,
@@ -34,6 +35,7 @@ export function ImportPanel({ onStored }: { onStored: (file: string) => void }) 
   const [file, setFile] = useState<File | null>(null)
   const [found, setFound] = useState<RecordingPreview | null>(null)
   const [said, setSaid] = useState<Said | null>(null)
+  const wrong = useWrong()
   const choose = (next: File) => {
     setFile(null)
     setFound(null)
@@ -83,9 +85,13 @@ export function ImportPanel({ onStored }: { onStored: (file: string) => void }) 
             <span className="dim">{t('import.rows', { rows: found.rows, form: found.form })}</span>
           </p>
           <Columns found={found} />
-          <Choice found={found} said={said} onChange={setSaid} />
+          <Choice found={found} said={said} wrong={wrong} onChange={setSaid} />
           <Curves found={found} said={said} />
-          <Button loading={act.busy} disabled={!statable(said)} onClick={() => void go()}>
+          <Button
+            loading={act.busy}
+            disabled={wrong.any || !statable(said)}
+            onClick={() => void go()}
+          >
             {t('import.go')}
           </Button>
         </>
@@ -134,10 +140,12 @@ function Columns({ found }: { found: RecordingPreview }) {
 function Choice({
   found,
   said,
+  wrong,
   onChange,
 }: {
   found: RecordingPreview
   said: Said
+  wrong: Wrong
   onChange: (said: Said) => void
 }) {
   const t = useT()
@@ -170,7 +178,7 @@ function Choice({
             unit="Hz"
             value={said.sample_rate_hz}
             onChange={(value) => set({ sample_rate_hz: value })}
-            onInvalid={() => set({ sample_rate_hz: Number.NaN })}
+            onWrong={wrong.of('sample_rate_hz')}
             min={10}
           />
         ) : (
@@ -205,7 +213,7 @@ function Choice({
             unit="Nm"
             value={said.rated_torque_nm}
             onChange={(value) => set({ rated_torque_nm: value })}
-            onInvalid={() => set({ rated_torque_nm: Number.NaN })}
+            onWrong={wrong.of('rated_torque_nm')}
             above={0}
             optional
           />
@@ -216,7 +224,7 @@ function Choice({
             unit="Nm/A"
             value={said.torque_constant_nm_a}
             onChange={(value) => set({ torque_constant_nm_a: value })}
-            onInvalid={() => set({ torque_constant_nm_a: Number.NaN })}
+            onWrong={wrong.of('torque_constant_nm_a')}
             above={0}
             optional
           />
@@ -250,13 +258,21 @@ function Choice({
         }
         data={STRUCTURES.map((value) => ({ value, label: t(`import.structure.${value}`) }))}
       />
-      <Drive said={said} set={set} />
+      <Drive said={said} wrong={wrong} set={set} />
     </>
   )
 }
 
 /** What narrows the band, and what gains need to know of the drive. */
-function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }) {
+function Drive({
+  said,
+  wrong,
+  set,
+}: {
+  said: Said
+  wrong: Wrong
+  set: (part: Partial<Said>) => void
+}) {
   const t = useT()
   const ms = said.loop_delay_s === null ? null : said.loop_delay_s * 1e3
   return (
@@ -268,7 +284,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
           unit="Hz"
           value={said.f_min_hz}
           onChange={(value) => set({ f_min_hz: value })}
-          onInvalid={() => set({ f_min_hz: Number.NaN })}
+          onWrong={wrong.of('f_min_hz')}
           min={0}
           optional
         />
@@ -277,7 +293,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
           unit="Hz"
           value={said.f_max_hz}
           onChange={(value) => set({ f_max_hz: value })}
-          onInvalid={() => set({ f_max_hz: Number.NaN })}
+          onWrong={wrong.of('f_max_hz')}
           above={said.f_min_hz ?? 0}
           optional
         />
@@ -288,7 +304,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="Hz"
               value={said.output_filter_hz}
               onChange={(value) => set({ output_filter_hz: value })}
-              onInvalid={() => set({ output_filter_hz: Number.NaN })}
+              onWrong={wrong.of('output_filter_hz')}
               above={0}
               optional
               help={t('import.filterHelp')}
@@ -298,7 +314,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="Hz"
               value={said.current_bandwidth_hz}
               onChange={(value) => set({ current_bandwidth_hz: value })}
-              onInvalid={() => set({ current_bandwidth_hz: Number.NaN })}
+              onWrong={wrong.of('current_bandwidth_hz')}
               above={0}
               optional
             />
@@ -307,7 +323,7 @@ function Drive({ said, set }: { said: Said; set: (part: Partial<Said>) => void }
               unit="ms"
               value={ms}
               onChange={(value) => set({ loop_delay_s: value === null ? null : value / 1e3 })}
-              onInvalid={() => set({ loop_delay_s: Number.NaN })}
+              onWrong={wrong.of('loop_delay_s')}
               min={0}
               max={100}
               optional

@@ -10,6 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/useObstacle'
+import { useWrong } from '../../widgets/useWrong'
 import { useRemembered } from '../motion/remembered'
 import { ExcitationPreview } from './ExcitationPreview'
 import { LimitFields, useLimits } from './limits'
@@ -39,12 +40,14 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
   const dark = useComputedColorScheme('light') === 'dark'
   const [previewed, setPreviewed] = useState(false)
   const highest = high ?? Number.POSITIVE_INFINITY
+  const wrong = useWrong()
   const request: SweepRequest | null =
     limits.limits === null ||
     low === null ||
     share === null ||
     count === null ||
-    !(highest >= 4 * low)
+    wrong.any ||
+    highest < 4 * low
       ? null
       : {
           ...limits.limits,
@@ -132,7 +135,7 @@ export function SweepForm({ drive, way }: { drive: string; way: Measurable }) {
             unit="Hz"
             value={high}
             onChange={setHigh}
-            onInvalid={() => setHigh(Number.NaN)}
+            onWrong={wrong.of('high')}
             optional
             min={4 * (low ?? 3)}
             help={t('sweep.highHelp')}

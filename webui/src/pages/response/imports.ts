@@ -65,7 +65,5 @@ export function guessed(found: RecordingPreview): Said {
 export const importedOf = (sweep: Sweep): ImportedFacts | null => sweep.imported ?? null
 export const axisOf = (sweep: Sweep): ImportedAxis | null => sweep.axis ?? null
 
-/** Whether it can be sent: no field has a text that is no number (NaN), and time is stated. */
-export const statable = (said: Said): boolean =>
-  (said.time !== null || said.sample_rate_hz !== null) &&
-  !Object.values(said).some((each) => Number.isNaN(each))
+/** Whether time is stated, without which nothing can be evaluated. */
+export const statable = (said: Said): boolean => said.time !== null || said.sample_rate_hz !== null

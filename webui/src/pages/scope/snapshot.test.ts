@@ -1,4 +1,5 @@
-import { answers, requests } from '../../testing/browser'
+// @vitest-environment happy-dom
+import { asked, refusal, serve } from '../../testing/page'
 import { expect, it } from 'vitest'
 import { problemOf, setConnection, setCsrf, UNREACHABLE } from '../../api/client'
 import { loadSnapshot, storeSnapshot } from './snapshot'
@@ -6,32 +7,22 @@ import { loadSnapshot, storeSnapshot } from './snapshot'
 it('stores a snapshot as this page: the server takes no change without its token', async () => {
   setCsrf('token')
   setConnection('c1')
-  answers.push({ method: 'POST', path: /snapshots\/a%20b$/, give: () => null })
+  serve(() => null)
   await storeSnapshot('a b', new Blob(['data']))
-  const { headers } = requests.at(-1)!
+  const { method, path, headers, body } = asked.at(-1)!
+  expect([method, path]).toEqual(['POST', '/scope/snapshots/a%20b'])
   expect(headers.get('X-Servodeck-CSRF')).toBe('token')
   expect(headers.get('X-Servodeck-Connection')).toBe('c1')
-  expect(await requests.at(-1)!.text()).toBe('data')
+  expect(body).toBe('data')
 })
 
 it('reports what the server said, and a server that does not answer, as everywhere', async () => {
-  const refusal = { type: 'urn:servodeck:forbidden', title: '', status: 403, detail: 'no' }
-  answers.unshift({
-    method: 'GET',
-    path: /snapshots\/x$/,
-    give: () => Response.json(refusal, { status: 403 }),
-  })
-  expect(problemOf(await loadSnapshot('x').catch((e: unknown) => e)).detail).toBe('no')
-  answers.unshift({
-    method: 'GET',
-    path: /snapshots\/x$/,
-    give: () => new Response('<html>', { status: 502 }),
-  })
-  expect(problemOf(await loadSnapshot('x').catch((e: unknown) => e)).status).toBe(502)
-  answers.unshift({
-    method: 'GET',
-    path: /snapshots\/x$/,
-    give: () => Promise.reject(new TypeError('Failed to fetch')),
-  })
-  expect(problemOf(await loadSnapshot('x').catch((e: unknown) => e)).type).toBe(UNREACHABLE)
+  const failed = () => loadSnapshot('x').then(() => null, problemOf)
+  serve(() => refusal(403, { detail: 'no' }))
+  expect((await failed())?.detail).toBe('no')
+  serve(() => new Response('<html>', { status: 502 }))
+  expect((await failed())?.status).toBe(502)
+  serve(() => Promise.reject(new TypeError('Failed to fetch')))
+  expect((await failed())?.type).toBe(UNREACHABLE)
+  expect(asked.at(-1)?.path).toBe('/scope/snapshots/x')
 })

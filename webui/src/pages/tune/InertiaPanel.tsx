@@ -9,6 +9,7 @@ import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/StartButton'
 import { useAction } from '../../widgets/useAction'
+import { useWrong } from '../../widgets/useWrong'
 import { fixed } from '../response/bode'
 import { asInertia, type Inertia } from '../response/results'
 import { useToolJob } from '../response/useToolJob'
@@ -35,6 +36,7 @@ export function InertiaPanel({
   const scheme = useScheme()
   const [repetitions, setRepetitions] = useState<number | null>(4)
   const [motor, setMotor] = useState<number | null>(null)
+  const wrong = useWrong()
   const [searchTorque, setSearchTorque] = useState<number | null>(20)
   const [searchSpeed, setSearchSpeed] = useState<number | null>(30)
   const { job, note, dismiss } = useToolJob(drive, 'inertia')
@@ -42,7 +44,7 @@ export function InertiaPanel({
   const result = asInertia(job?.result)
   const complete =
     limits !== null &&
-    !Number.isNaN(motor) &&
+    !wrong.any &&
     repetitions !== null &&
     scheme.complete &&
     searchTorque !== null &&
@@ -105,7 +107,7 @@ export function InertiaPanel({
           unit="kg·m²"
           value={motor}
           onChange={setMotor}
-          onInvalid={() => setMotor(Number.NaN)}
+          onWrong={wrong.of('motor')}
           above={0}
           optional
           help={t('inertia.motorHelp')}

@@ -10,6 +10,7 @@ import { Panel } from '../../../widgets/Panel'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { StartButton } from '../../../widgets/StartButton'
 import { useAction } from '../../../widgets/useAction'
+import { useWrong } from '../../../widgets/useWrong'
 import { asAutotune } from '../../response/results'
 import { useToolJob } from '../../response/useToolJob'
 import { AutotuneReport } from './AutotuneReport'
@@ -41,6 +42,7 @@ export function AutotunePanel({
   const [load, setLoad] = useState<(typeof LOADS)[number]>('auto')
   const [apply, setApply] = useState(true)
   const [motor, setMotor] = useState<number | null>(null)
+  const wrong = useWrong()
   const scheme = useScheme()
   const start = useAction()
   const { job, note, dismiss } = useToolJob(drive, 'autotune')
@@ -92,7 +94,7 @@ export function AutotunePanel({
           unit="kg·m²"
           value={motor}
           onChange={setMotor}
-          onInvalid={() => setMotor(Number.NaN)}
+          onWrong={wrong.of('motor')}
           above={0}
           optional
           help={t('autotune.motorHelp')}
@@ -113,9 +115,7 @@ export function AutotunePanel({
         </p>
       )}
       <StartButton
-        obstacle={
-          obstacle ?? (scheme.complete && !Number.isNaN(motor) ? null : t('start.incomplete'))
-        }
+        obstacle={obstacle ?? (scheme.complete && !wrong.any ? null : t('start.incomplete'))}
         busy={start.busy}
         onStart={() => void go()}
       >

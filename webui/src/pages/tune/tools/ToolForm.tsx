@@ -4,6 +4,7 @@ import { api, ask } from '../../../api/client'
 import type { ToolInfo } from '../../../api/schema'
 import { useLanguage } from '../../../i18n'
 import { NumberField } from '../../../widgets/NumberField'
+import type { Wrong } from '../../../widgets/useWrong'
 import type { Limits } from '../../response/limits'
 import { MotionWarning } from '../MotionWarning'
 import { warnsOfMotion } from './toolMotion'
@@ -63,7 +64,6 @@ export function fieldsOf(settings: Record<string, unknown>): Field[] {
   })
 }
 
-/** NaN is a text that is no valid number. */
 export type Values = Record<string, number | boolean | null>
 
 let asked: Promise<ToolInfo[]> | undefined
@@ -106,6 +106,7 @@ export function ToolForm({
   limits,
   fields,
   values,
+  wrong,
   text,
   onChange,
 }: {
@@ -114,6 +115,7 @@ export function ToolForm({
   limits: Limits | null
   fields: Field[]
   values: Values
+  wrong: Wrong
   text: (name: string) => string
   onChange: (values: Values) => void
 }) {
@@ -138,7 +140,7 @@ export function ToolForm({
               {...field.limits}
               value={typeof values[field.name] === 'number' ? (values[field.name] as number) : null}
               onChange={(value) => set(field.name, value)}
-              onInvalid={() => set(field.name, Number.NaN)}
+              onWrong={wrong.of(field.name)}
               integer={field.type === 'integer'}
               optional={field.optional}
             />
@@ -150,11 +152,9 @@ export function ToolForm({
   )
 }
 
-/** Whether every field that must have a value has one, and none has a text that is no number. */
+/** Whether every field that must have a value has one. */
 export const complete = (fields: Field[], values: Values): boolean =>
-  fields.every(({ name, optional }) =>
-    Number.isNaN(values[name]) ? false : optional || values[name] !== null,
-  )
+  fields.every(({ name, optional }) => optional || values[name] !== null)
 
 export const initialValues = (fields: Field[]): Values =>
   Object.fromEntries(fields.map((field) => [field.name, field.initial]))

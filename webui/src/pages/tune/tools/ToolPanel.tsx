@@ -7,6 +7,7 @@ import { Panel } from '../../../widgets/Panel'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { StartButton } from '../../../widgets/StartButton'
 import { useAction } from '../../../widgets/useAction'
+import { useWrong } from '../../../widgets/useWrong'
 import type { Limits } from '../../response/limits'
 import { useToolJob } from '../../response/useToolJob'
 import { complete, fieldsOf, initialValues, ToolForm, useTool, type Values } from './ToolForm'
@@ -36,6 +37,7 @@ export function useToolRun(
   const { tool, text } = useTool(kind)
   const fields = useMemo(() => (tool ? fieldsOf(tool.settings) : []), [tool])
   const [values, setValues] = useState<Values>({})
+  const wrong = useWrong()
   const { job, note, dismiss } = useToolJob(drive, kind)
   const start = useAction()
   const begun = job?.id ?? ''
@@ -48,7 +50,7 @@ export function useToolRun(
     void start.run(async () =>
       setJob(await startTool(kind, drive, settings as ToolSettings[typeof kind])),
     )
-  return { tool, text, fields, values, setValues, job, note, dismiss, start, begin }
+  return { tool, text, fields, values, setValues, wrong, job, note, dismiss, start, begin }
 }
 
 export type ToolRun = ReturnType<typeof useToolRun>
@@ -103,7 +105,7 @@ export function ToolStart({
   onStart: () => void
 }) {
   const t = useT()
-  const { tool, text, fields, values, setValues, start } = run
+  const { tool, text, fields, values, setValues, wrong, start } = run
   if (!tool) return null
   return (
     <>
@@ -112,12 +114,15 @@ export function ToolStart({
         limits={limits}
         fields={fields.filter((each) => each.name !== without)}
         values={values}
+        wrong={wrong}
         text={text}
         onChange={setValues}
       />
       {warning}
       <StartButton
-        obstacle={obstacle ?? (complete(fields, values) ? missing : t('start.incomplete'))}
+        obstacle={
+          obstacle ?? (complete(fields, values) && !wrong.any ? missing : t('start.incomplete'))
+        }
         busy={start.busy || busy}
         onStart={onStart}
       >

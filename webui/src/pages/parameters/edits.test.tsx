@@ -1,15 +1,13 @@
-import { asked, later, serve } from '../../testing/bench'
-import { createElement } from 'react'
-import { beforeEach, describe, expect, it, vi } from 'vitest'
+// @vitest-environment happy-dom
+import { asked, later, serve, settled, shown, type } from '../../testing/page'
+import { fireEvent, screen } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
+import { beforeEach, describe, expect, it } from 'vitest'
 import type { ParameterRow, ParameterValue } from '../../api/schema'
 import { setReadings, setRows } from '../../live/store'
-import { type Drawn, Page, press, textOf, type } from '../../testing/render'
 import { Editor } from './Detail'
 import { discardEdits, type Edit, setEdit, useEdits, writeEdits } from './edits'
 import { Grid } from './Grid'
-
-vi.mock('@mantine/core', () => import('../../testing/mantine'))
-vi.mock('../../live/live', () => ({ stand: () => {}, send: () => {} }))
 
 const reading = (key: string, raw: number, part: Partial<ParameterValue> = {}): ParameterValue => ({
   key,
@@ -57,29 +55,24 @@ function Seen() {
   return null
 }
 const grid = () =>
-  new Page([
-    createElement(Seen, { key: 'seen' }),
-    createElement(Grid, {
-      key: 'grid',
-      drive: X,
-      profile: 'p',
-      rows,
-      asRaw: false,
-      live: false,
-      chosen: first.key,
-      onChoose: () => {},
-    }),
-  ])
-const body = (page: Page): Drawn => page.one((each) => each.props.role === 'grid')
-const button = (page: Page): Drawn =>
-  page.one((each) => each.props.className === 'value-button' && textOf(each).includes('50'))
-const editor = (page: Page): Drawn => page.one('input')
-const key = (name: string, more: object = {}) => ({
-  key: name,
-  preventDefault: () => {},
-  stopPropagation: () => {},
-  ...more,
-})
+  shown(
+    <>
+      <Seen />
+      <Grid
+        drive={X}
+        profile="p"
+        rows={rows}
+        asRaw={false}
+        live={false}
+        chosen={first.key}
+        onChoose={() => {}}
+      />
+    </>,
+  )
+const cell = () => screen.getByRole('button', { name: /^Edit Speed 2001:00: / })
+const editor = () => screen.getByRole<HTMLInputElement>('textbox', { name: 'Speed 2001:00' })
+/** Leave the editor for something else. */
+const leave = () => settled(() => editor().blur())
 
 beforeEach(() => {
   discardEdits(X)
@@ -90,46 +83,47 @@ beforeEach(() => {
 
 describe('a raw edit among values in their unit', () => {
   it('keeps its scale when its cell is opened and left', async () => {
-    const page = grid()
-    await page.after(() => setEdit(X, first.key, { text: '600', asRaw: true }))
-    await page.after(() => press(button(page), 'onClick', { detail: 1 }))
-    await page.after(() => press(editor(page), 'onBlur'))
+    await grid()
+    await settled(() => setEdit(X, first.key, { text: '600', asRaw: true }))
+    await userEvent.click(cell())
+    await leave()
     expect(edits.get(first.key)).toEqual({ text: '600', asRaw: true })
-    await page.after(() => press(button(page), 'onClick', { detail: 1 }))
+    await userEvent.click(cell())
     // The cell is in the unit of its column, whatever the edit was.
-    expect(editor(page).props.value).toBe('60')
-    await page.after(() => type(editor(page), '70'))
-    await page.after(() => press(editor(page), 'onBlur'))
+    expect(editor().value).toBe('60')
+    await type(editor(), '70')
+    await leave()
     expect(edits.get(first.key)).toEqual({ text: '70', asRaw: false })
   })
 
   it('is not shown as if it were in the unit', async () => {
-    const page = grid()
-    await page.after(() => setEdit(X, first.key, { text: '600', asRaw: true }))
+    await grid()
+    await settled(() => setEdit(X, first.key, { text: '600', asRaw: true }))
     // 600 raw are 60 rpm; the column beside it says rpm.
-    expect(textOf(button(page))).toBe('50 60')
+    expect(cell().textContent).toBe('50 60')
   })
 
   it('is edited as raw in an editor that was open already', async () => {
-    const page = new Page([
-      createElement(Seen, { key: 'seen' }),
-      createElement(Editor, { key: 'editor', drive: X, row: first }),
-    ])
-    await page.after(() => setEdit(X, first.key, { text: '600', asRaw: true }))
-    expect(page.one('Checkbox').props.checked).toBe(true)
-    await page.after(() => type(page.one('TextInput'), '650'))
+    await shown(
+      <>
+        <Seen />
+        <Editor drive={X} row={first} />
+      </>,
+    )
+    await settled(() => setEdit(X, first.key, { text: '600', asRaw: true }))
+    expect(screen.getByRole<HTMLInputElement>('checkbox').checked).toBe(true)
+    await type(screen.getByRole('textbox'), '650')
     expect(edits.get(first.key)).toEqual({ text: '650', asRaw: true })
   })
 })
 
 describe('a cell that is opened and left', () => {
   it('edits nothing, although the value has changed meanwhile', async () => {
-    const page = grid()
-    await page.after(() => press(body(page), 'onKeyDown', { ...key('F2'), target: null }))
-    await page.after(() =>
-      setReadings(X, [reading(first.key, 510, { time: '2026-11-21T10:00:09Z' })]),
-    )
-    await page.after(() => press(editor(page), 'onBlur'))
+    await grid()
+    fireEvent.keyDown(screen.getByRole('grid'), { key: 'F2' })
+    expect(editor().value).toBe('50')
+    await settled(() => setReadings(X, [reading(first.key, 510, { time: '2026-11-21T10:00:09Z' })]))
+    await leave()
     expect(edits.size).toBe(0)
   })
 })
@@ -141,22 +135,23 @@ describe('writing', () => {
   it('keeps what was typed while the value before it was written', async () => {
     const written = later<object>()
     serve(() => written.promise)
-    const page = new Page(createElement(Seen))
-    setEdit(X, first.key, { text: '60', asRaw: false })
-    const done = writeEdits(X, [first.key])
-    setEdit(X, first.key, { text: '75', asRaw: false })
-    written.give(answer([first.key]))
-    await page.after(() => done)
+    await shown(<Seen />)
+    await settled(async () => {
+      setEdit(X, first.key, { text: '60', asRaw: false })
+      const done = writeEdits(X, [first.key])
+      setEdit(X, first.key, { text: '75', asRaw: false })
+      written.give(answer([first.key]))
+      await done
+    })
     expect(edits.get(first.key)).toEqual({ text: '75', asRaw: false })
   })
 
   it('reports by the keyboard what it reports by the button', async () => {
     serve(() => 409)
-    const page = grid()
-    setEdit(X, first.key, { text: '60', asRaw: false })
-    await page.after(() =>
-      press(body(page), 'onKeyDown', { ...key('Enter', { ctrlKey: true }), target: null }),
-    )
+    await grid()
+    await settled(() => setEdit(X, first.key, { text: '60', asRaw: false }))
+    fireEvent.keyDown(screen.getByRole('grid'), { key: 'Enter', ctrlKey: true })
+    await settled()
     expect(asked.map((each) => each.method)).toEqual(['PUT'])
     expect(edits.has(first.key)).toBe(true)
     expect(problems.has(first.key)).toBe(true)

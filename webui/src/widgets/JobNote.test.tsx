@@ -1,13 +1,14 @@
-import '../testing/browser'
+// @vitest-environment happy-dom
+import { shown } from '../testing/page'
+import { screen } from '@testing-library/react'
 import { expect, it, vi } from 'vitest'
 import type { JobInfo } from '../api/schema'
 import { forgetServerClock, heardServerTime } from '../live/server-clock'
 import { setJob } from '../live/store'
-import { Shallow } from '../testing/shallow'
 import { JobNote } from './JobNote'
 
-it('counts by the clock of the server, whose times a job has', () => {
-  vi.useFakeTimers()
+it('counts by the clock of the server, whose times a job has', async () => {
+  vi.useFakeTimers({ toFake: ['Date'] })
   vi.setSystemTime(Date.parse('2026-01-01T10:30:30Z'))
   forgetServerClock()
   heardServerTime('2026-01-01T10:00:30Z')
@@ -23,9 +24,9 @@ it('counts by the clock of the server, whose times a job has', () => {
     step: '',
     step_message: words,
   } as unknown as JobInfo)
-  const note = new Shallow(JobNote, { id: 'c' })
-  expect(note.text).toContain('30 s')
-  expect(note.text).not.toContain('30:30')
-  note.unmount()
+  await shown(<JobNote id="c" />)
+  const note = screen.getByRole('status').textContent
+  expect(note).toContain('30 s')
+  expect(note).not.toContain('30:30')
   vi.useRealTimers()
 })

@@ -1,18 +1,15 @@
-import { serve } from '../../testing/bench'
-import { createElement } from 'react'
-import { describe, expect, it, vi } from 'vitest'
+// @vitest-environment happy-dom
+import { serve, settled, shown } from '../../testing/page'
+import { screen } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
+import { describe, expect, it } from 'vitest'
 import type { DriveSummary } from '../../api/schema'
 import { setDrives, setLink } from '../../live/store'
-import { Page, press, textOf } from '../../testing/render'
 import { StepNumbers } from '../tune/StepNumbers'
 import { CursorTable } from './Readings'
 import { ResponsePage } from './ResponsePage'
 import type { Step, Sweep } from './results'
 import { ofAxis } from './useMeasurements'
-
-vi.mock('@mantine/core', () => import('../../testing/mantine'))
-vi.mock('uplot', () => ({ default: class {} }))
-vi.mock('../../app/session', () => ({ hasRight: () => true, useSession: () => null }))
 
 const LINES = [10, 20, 40]
 const sweep = (unit: string, resonance: number) => ({
@@ -55,7 +52,7 @@ const GAINS = {
   speed_hz: 40, integral_hz: 10, position_1_s: 30, inertia_kgm2: 0.001, raw: {}, levels: [],
 } // prettier-ignore
 
-async function shown(file: string, over: string | null): Promise<string> {
+async function read(file: string, over: string | null): Promise<string> {
   serve(({ path }) => {
     if (path === '/measurements') return FILES.map((each) => each.info)
     const found = FILES.find((each) => path === `/measurements/${each.info.file}`)
@@ -66,53 +63,41 @@ async function shown(file: string, over: string | null): Promise<string> {
   })
   setLink({ open: true, attempt: 0, roundTripMs: null }, 0)
   setDrives([{ id: 'x', name: 'X', profile: 'p', serial: 1, ports: [] } as unknown as DriveSummary])
-  const page = new Page(createElement(ResponsePage, { drive: 'x' }))
-  await page.after()
-  const row = (name: string) => FILES.findIndex((each) => each.info.file === name)
-  const button = (name: string, words: string) =>
-    page.all((each) => each.type === 'Button' && textOf(each) === words)[row(name)]!
-  await page.after(() => press(button(file, 'Show')))
-  if (over) await page.after(() => press(button(over, 'Compare')))
-  const text = page.text()
-  page.end()
+  const page = await shown(<ResponsePage drive="x" />)
+  await settled()
+  const press = async (name: string, words: string) => {
+    const row = FILES.findIndex((each) => each.info.file === name)
+    await userEvent.click(screen.getAllByRole('button', { name: words })[row]!)
+    await settled()
+  }
+  await press(file, 'Show')
+  if (over) await press(over, 'Compare')
+  const text = page.container.textContent
+  page.unmount()
   return text
 }
 
 const LOOP = 'Try gains'
-/** Draws a whole page, on a busy machine. */
-const LONG_MS = 60_000
 
 describe('a response', () => {
-  it(
-    'of another axis predicts nothing for this one',
-    async () => {
-      const own = await shown('own', null)
-      expect(own).not.toContain('of another axis')
-      expect(own).toContain(LOOP)
-      const other = await shown('other', null)
-      expect(other).toContain('This response is of another axis')
-      expect(other).not.toContain(LOOP)
-    },
-    LONG_MS,
-  )
+  it('of another axis predicts nothing for this one', async () => {
+    const own = await read('own', null)
+    expect(own).not.toContain('of another axis')
+    expect(own).toContain(LOOP)
+    const other = await read('other', null)
+    expect(other).toContain('This response is of another axis')
+    expect(other).not.toContain(LOOP)
+  })
 
-  it(
-    'of another axis does not say that the mechanics have changed',
-    async () => {
-      expect(await shown('own', 'before')).toContain('A peak has moved')
-      expect(await shown('own', 'other')).not.toContain('A peak has moved')
-    },
-    LONG_MS,
-  )
+  it('of another axis does not say that the mechanics have changed', async () => {
+    expect(await read('own', 'before')).toContain('A peak has moved')
+    expect(await read('own', 'other')).not.toContain('A peak has moved')
+  })
 
-  it(
-    'in another unit is not drawn over it',
-    async () => {
-      expect(await shown('own', 'before')).not.toContain('not drawn over it')
-      expect(await shown('own', 'rated')).toContain(`is in ${RATED}`)
-    },
-    LONG_MS,
-  )
+  it('in another unit is not drawn over it', async () => {
+    expect(await read('own', 'before')).not.toContain('not drawn over it')
+    expect(await read('own', 'rated')).toContain(`is in ${RATED}`)
+  })
 
   it('belongs to an axis by serial number, where both have one, else by name', () => {
     const axis = { name: 'X', profile: 'p', serial: 1 }
@@ -122,32 +107,27 @@ describe('a response', () => {
     expect(ofAxis({ drive: 'X', profile: 'q', serial: 1 }, axis)).toBe(false)
   })
 
-  it('has the phase under a cursor that is drawn', () => {
-    const page = new Page(
-      createElement(CursorTable, {
-        sweep: sweep(SI, 20) as unknown as Sweep,
-        over: null,
-        cursors: [10, 40],
-      }),
-    )
+  it('has the phase under a cursor that is drawn', async () => {
+    const drawn = sweep(SI, 20) as unknown as Sweep
+    const { container } = await shown(<CursorTable sweep={drawn} over={null} cursors={[10, 40]} />)
     // −450° is drawn as −90°.
-    expect(page.text()).toContain('−90.0°')
-    expect(page.text()).not.toContain('−450')
+    expect(container.textContent).toContain('−90.0°')
+    expect(container.textContent).not.toContain('−450')
   })
 })
 
 describe('a step beside an earlier one', () => {
-  it('has the settling window of either', () => {
+  it('has the settling window of either', async () => {
     const step = (part: object) =>
       ({ kind: 'speed', unit: 'rpm', time_s: [], demand: [], actual: [], torque_percent: [],
          step: { overshoot_percent: 1, rise_s: 0.01, settling_s: 0.02 }, move: null,
          torque_peak_percent: 1, torque_rms_percent: 1, ...part }) as unknown as Step // prettier-ignore
-    const numbers = new Page(
-      createElement(StepNumbers, {
-        step: step({ widened: false, window: 2 }),
-        over: step({ widened: true, window: 12.5 }),
-      }),
+    const { container } = await shown(
+      <StepNumbers
+        step={step({ widened: false, window: 2 })}
+        over={step({ widened: true, window: 12.5 })}
+      />,
     )
-    expect(numbers.text()).toContain('12.50 rpm')
+    expect(container.textContent).toContain('12.50 rpm')
   })
 })

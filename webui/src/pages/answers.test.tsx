@@ -1,11 +1,12 @@
-import { asked, later, serve } from '../testing/bench'
-import { createElement } from 'react'
-import { beforeEach, describe, expect, it, vi } from 'vitest'
+// @vitest-environment happy-dom
+import { asked, later, serve, settled, shown, type } from '../testing/page'
+import { fireEvent, renderHook, screen, waitFor } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
+import { beforeEach, describe, expect, it } from 'vitest'
 import type { DriveSummary, InvitationView, JobInfo } from '../api/schema'
 import { SupportBar } from '../app/SupportBar'
 import { setPeople } from '../live/people'
 import { setDrives, setJob, setLink } from '../live/store'
-import { Page, press, textOf, type } from '../testing/render'
 import { ChainCheck } from './audit/ChainCheck'
 import { ALL } from './audit/filters'
 import { useAudit } from './audit/useAudit'
@@ -16,11 +17,8 @@ import { Compare } from './parameters/Compare'
 import { ParameterTable } from './parameters/ParameterTable'
 import { MyAccess } from './people/MyAccess'
 
-vi.mock('@mantine/core', () => import('../testing/mantine'))
-vi.mock('../live/live', () => ({ stand: () => {}, send: () => {} }))
-
 const drive = { id: 'x', name: 'X', profile: 'p', unsaved: 0, pending: 0 } as DriveSummary
-const typed = () => new Promise((resolve) => setTimeout(resolve, 200))
+const press = (name: string) => userEvent.click(screen.getByRole('button', { name }))
 
 beforeEach(() => {
   setLink({ open: true, attempt: 0, roundTripMs: null }, 0)
@@ -38,11 +36,13 @@ describe('an answer that was overtaken', () => {
           ? first.promise
           : 404,
     )
-    const page = new Page(createElement(Compare, { drive, rows: [] }))
-    await page.after(() => type(page.one('NativeSelect'), 'file:a.sdset'))
-    await page.after(() => press(page.named('Button', 'Compare')))
-    await page.after(() => type(page.one('NativeSelect'), 'file:b.sdset'))
-    await page.after(() =>
+    await shown(<Compare drive={drive} rows={[]} />)
+    const choose = (name: string) =>
+      userEvent.selectOptions(screen.getByRole('combobox', { name: 'Compare with' }), name)
+    await choose('file a.sdset')
+    await press('Compare')
+    await choose('file b.sdset')
+    await settled(() =>
       first.give({
         file: 'a.sdset',
         rows: [],
@@ -51,8 +51,9 @@ describe('an answer that was overtaken', () => {
         same_serial: true,
       }),
     )
-    expect(page.all('table')).toEqual([])
-    page.end()
+    expect(asked.some(({ path }) => path.includes('a.sdset'))).toBe(true)
+    expect(screen.queryByText('No difference.')).toBeNull()
+    expect(screen.queryByRole('table')).toBeNull()
   })
 
   it('is not shown as what fits the filters of the library', async () => {
@@ -65,19 +66,14 @@ describe('an answer that was overtaken', () => {
           ? entries('ab')
           : slow.promise,
     )
-    let seen: ReturnType<typeof useLibrary> | null = null
-    function Library({ filters }: { filters: Filters }) {
-      seen = useLibrary(filters)
-      return null
-    }
-    const at = (words: string) => createElement(Library, { filters: { ...NO_FILTERS, words } })
-    const page = new Page(at('a'))
-    await page.show(at('ab'))
-    await typed()
-    await page.after()
-    await page.after(() => slow.give(entries('a')))
-    expect(seen!.entries).toEqual([{ id: 'ab' }])
-    page.end()
+    const library = renderHook((filters: Filters) => useLibrary(filters), {
+      initialProps: { ...NO_FILTERS, words: 'a' },
+    })
+    await waitFor(() => expect(asked.some(({ path }) => /words=a(&|$)/.test(path))).toBe(true))
+    library.rerender({ ...NO_FILTERS, words: 'ab' })
+    await waitFor(() => expect(library.result.current.entries).toEqual([{ id: 'ab' }]))
+    await settled(() => slow.give(entries('a')))
+    expect(library.result.current.entries).toEqual([{ id: 'ab' }])
   })
 
   it('does not list older entries of the audit twice', async () => {
@@ -88,44 +84,44 @@ describe('an answer that was overtaken', () => {
           : { events: [{ number: 5 }], next: 5 }
         : {},
     )
-    let seen: ReturnType<typeof useAudit> | null = null
-    function Audit() {
-      seen = useAudit(ALL)
-      return null
-    }
-    const page = new Page(createElement(Audit))
-    await page.after()
-    await page.after(() => {
-      seen!.older!()
-      seen!.older!()
+    const { result } = renderHook(() => useAudit(ALL))
+    await settled()
+    await settled(() => {
+      const { older } = result.current
+      older!()
+      older!()
     })
-    expect(seen!.events!.map((each) => each.number)).toEqual([5, 4])
-    page.end()
+    expect(result.current.events!.map((each) => each.number)).toEqual([5, 4])
   })
 })
 
 describe('a verdict', () => {
   it('is of the anchor that was checked', async () => {
     serve(() => ({ ok: true, entries: 3, head: 'h', broken: null, why: '' }))
-    const page = new Page(createElement(ChainCheck))
-    await page.after(() => press(page.named('Button', 'Check the chain')))
-    expect(page.all((each) => each.props.role === 'status')).toHaveLength(1)
-    await page.after(() => type(page.one('TextInput'), `7:${'0'.repeat(64)}`))
-    expect(page.all((each) => each.props.role === 'status')).toEqual([])
+    await shown(<ChainCheck />)
+    await press('Check the chain')
+    await settled()
+    expect(screen.getAllByRole('status')).toHaveLength(1)
+    fireEvent.change(screen.getByRole('textbox'), { target: { value: `7:${'0'.repeat(64)}` } })
+    expect(screen.queryAllByRole('status')).toEqual([])
   })
 
   it('does not call a password changed that was refused', async () => {
     serve(({ method }) => (method === 'PUT' ? {} : []))
-    const page = new Page(createElement(MyAccess))
-    const change = () =>
-      page.after(() => press(page.all('form')[0]!, 'onSubmit', { preventDefault: () => undefined }))
-    await page.after()
+    await shown(<MyAccess />)
+    const changed = () => screen.queryByText('Changed. Your other log-ins have ended.')
+    const change = async () => {
+      await type(screen.getByLabelText(/^Current password/), 'present')
+      await type(screen.getByLabelText(/^New password/), 'a-new-password')
+      await press('Change the password')
+      await settled()
+    }
     await change()
-    expect(page.text()).toContain('Changed. Your other log-ins have ended.')
+    expect(changed()).not.toBeNull()
     serve(({ method }) => (method === 'PUT' ? 403 : []))
     await change()
     expect(asked.at(-1)?.method).toBe('PUT')
-    expect(page.text()).not.toContain('Changed. Your other log-ins have ended.')
+    expect(changed()).toBeNull()
   })
 })
 
@@ -133,12 +129,13 @@ describe('the right of a guest', () => {
   it('is not shown for all axes where its axis is not connected', async () => {
     const grant = { rights: ['motion'], until: '2026-11-21T10:00:00Z', drive: 'y', by: 'p' }
     const invitation = { id: 'i', guest: 'G', by: 'p', state: 'joined', allowed: [], grant }
-    const page = new Page(createElement(SupportBar))
-    await page.after(() =>
+    await shown(<SupportBar />)
+    await settled(() =>
       setPeople({ people: [], invitations: [invitation as unknown as InvitationView] } as never),
     )
-    expect(page.text()).toContain('y')
-    expect(page.text()).not.toContain('all axes')
+    const granted = screen.getByRole('status').textContent
+    expect(granted).toMatch(/\by\b/)
+    expect(granted).not.toContain('all axes')
   })
 })
 
@@ -155,15 +152,14 @@ describe('a read of all parameters', () => {
        problem: null, started: '2020-01-01T00:00:00Z', ended: null, state: 'running', ...part }) as JobInfo // prettier-ignore
 
   it('is reported to its end also where the clock of this computer is ahead', async () => {
-    const page = new Page(createElement(ParameterTable, { drive, rows: [], asked: null }))
+    const page = await shown(<ParameterTable drive={drive} rows={[]} asked={null} />)
     const problem = { type: 'x', title: '', status: 0, detail: 'the line broke' }
-    await page.after(() => setJob(job({})))
-    await page.after(() => setJob(job({ state: 'failed', ended: '2020-01-01T00:00:09Z', problem })))
-    expect(page.all((each) => textOf(each).includes('the line broke'))).not.toEqual([])
-    page.end()
+    await settled(() => setJob(job({})))
+    await settled(() => setJob(job({ state: 'failed', ended: '2020-01-01T00:00:09Z', problem })))
+    expect(screen.queryByText(/the line broke/)).not.toBeNull()
+    page.unmount()
     // One that had ended before the page was opened is no news.
-    const again = new Page(createElement(ParameterTable, { drive, rows: [], asked: null }))
-    expect(again.text()).not.toContain('the line broke')
-    again.end()
+    await shown(<ParameterTable drive={drive} rows={[]} asked={null} />)
+    expect(screen.queryByText(/the line broke/)).toBeNull()
   })
 })

@@ -1,14 +1,18 @@
-import { asked, serve } from '../../testing/bench'
-import { createElement } from 'react'
-import { beforeEach, describe, expect, it, vi } from 'vitest'
+// @vitest-environment happy-dom
+import { asked, sent, serve, settled, shown, type } from '../../testing/page'
+import { screen, waitFor } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
+import { beforeEach, describe, expect, it } from 'vitest'
 import type { NotchSlotInfo } from '../../api/schema'
 import { setLink } from '../../live/store'
-import { Page, press, type } from '../../testing/render'
 import { NotchEditor } from './NotchEditor'
 import { merged, type Notches, useNotches } from './useNotches'
 
+<<<<<<< HEAD:webui/src/pages/response/notches.test.ts
 vi.mock('@mantine/core', () => import('../../testing/mantine'))
 
+=======
+>>>>>>> h-p:webui/src/pages/response/notches.test.tsx
 const slot = (number: number, center_hz: number | null): NotchSlotInfo => ({
   slot: number,
   enabled: center_hz !== null,
@@ -25,16 +29,16 @@ let notches: Notches
 
 function Editor() {
   notches = useNotches('x', LINES)
-  return createElement(NotchEditor, { drive: 'x', notches })
+  return <NotchEditor drive="x" notches={notches} />
 }
 const connected = (open: boolean) => setLink({ open, attempt: 0, roundTripMs: null }, 0)
-const settled = () => new Promise((resolve) => setTimeout(resolve, 300))
 const opened = async () => {
-  const page = new Page(createElement(Editor))
-  await page.after()
+  await shown(<Editor />)
+  // The editor waits before it asks what the drive would make of the notches.
+  await waitFor(() => expect(sent('/preview')).toBeDefined())
   await settled()
-  return page.after()
 }
+const field = (name: string) => screen.getByRole<HTMLInputElement>('textbox', { name })
 
 beforeEach(() => {
   connected(true)
@@ -63,32 +67,30 @@ describe('notches that were edited', () => {
   })
 
   it('outlive a lost connection', async () => {
-    const page = await opened()
-    await page.after(() => notches.set(0, shape(520)))
-    await page.after(() => connected(false))
-    await page.after(() => connected(true))
+    await opened()
+    await settled(() => notches.set(0, shape(520)))
+    await settled(() => connected(false))
+    await settled(() => connected(true))
     expect(notches.wanted[0]).toEqual(shape(520))
     expect(notches.edited).toBe(true)
-    await page.after(() => press(page.named('Button', 'Read them again')))
+    await userEvent.click(screen.getByRole('button', { name: 'Read them again' }))
+    await settled()
     expect(notches.wanted[0]).toEqual(shape(400))
-    page.end()
   })
 
   it('are not written while a field has no number', async () => {
-    const page = await opened()
-    const write = () => page.named('Button', 'Write the notches').props.disabled
-    await page.after(() => type(page.named('TextInput', 'Width (−3 dB)'), '120'))
-    await settled()
-    await page.after()
-    expect(write()).toBe(false)
-    await page.after(() => type(page.named('TextInput', 'Centre'), '5OO'))
-    expect(page.named('TextInput', 'Centre').props.value).toBe('5OO')
+    await opened()
+    const write = () =>
+      screen.getByRole<HTMLButtonElement>('button', { name: 'Write the notches' }).disabled
+    await type(field('Width (−3 dB)'), '120')
+    await waitFor(() => expect(write()).toBe(false))
+    await type(field('Centre'), '5OO')
+    expect(field('Centre').value).toBe('5OO')
     expect(write()).toBe(true)
     // Moved on the plot, the notch has a number again, and the field shows it.
-    await page.after(() => notches.set(0, { ...shape(480), width_hz: 120 }))
-    expect(page.named('TextInput', 'Centre').props.value).toBe('480')
+    await settled(() => notches.set(0, { ...shape(480), width_hz: 120 }))
+    expect(field('Centre').value).toBe('480')
     expect(write()).toBe(false)
     expect(asked.some((each) => each.method === 'PUT')).toBe(false)
-    page.end()
   })
 })

@@ -1,24 +1,26 @@
-import { asked, later, refusal, serve } from '../../testing/bench'
-import { createElement } from 'react'
+// @vitest-environment happy-dom
+import { asked, later, refusal, serve, settled, shown, type } from '../../testing/page'
+import { screen } from '@testing-library/react'
+import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it, vi } from 'vitest'
 import type { ParameterRow, ParameterValue } from '../../api/schema'
 import { setReadings, setRows } from '../../live/store'
-import { Page, press } from '../../testing/render'
 import { ParameterFields } from '../../widgets/ParameterFields'
-import { setEdit } from '../parameters/edits'
 import { remember, useChanges } from './undo'
 import { UndoNote } from './UndoNote'
-
-vi.mock('@mantine/core', () => import('../../testing/mantine'))
-vi.mock('../../live/live', () => ({ stand: () => {}, send: () => {} }))
 
 let changes: ReturnType<typeof useChanges> = []
 let drive = ''
 function Note() {
   changes = useChanges(drive)
-  return createElement(UndoNote, { drive, onUndone: () => {} })
+  return <UndoNote drive={drive} onUndone={() => {}} />
 }
-const button = (page: Page) => page.one('Button')
+const press = (name: string) => userEvent.click(screen.getByRole('button', { name }))
+/** Changes are told apart by their time. */
+async function nextMillisecond(): Promise<void> {
+  const begun = Date.now()
+  while (Date.now() === begun) await settled()
+}
 const sent = () => asked.at(-1)?.body as { before: object; after: object | null }
 
 let number = 0
@@ -30,26 +32,27 @@ beforeEach(() => {
 describe('an undo', () => {
   it('takes the change off the list that it undid, not one written meanwhile', async () => {
     remember(drive, 'gains', { before: { a: 1 }, after: { a: 2 } })
-    const page = new Page(createElement(Note))
+    await shown(<Note />)
     const answer = later<object>()
     serve(() => answer.promise)
-    await page.after(() => press(button(page)))
-    await new Promise((resolve) => setTimeout(resolve, 2))
-    remember(drive, 'notches', { before: { b: 1 }, after: { b: 2 } })
-    await page.after(() => answer.give({ before: {}, after: {} }))
+    await press('Undo')
+    await nextMillisecond()
+    await settled(() => remember(drive, 'notches', { before: { b: 1 }, after: { b: 2 } }))
+    await settled(() => answer.give({ before: {}, after: {} }))
     expect(changes.map((each) => each.what)).toEqual(['notches'])
   })
 
   it('overwrites what somebody wrote since only where that change was refused for it', async () => {
     remember(drive, 'gains', { before: { a: 1 }, after: { a: 2 } })
-    const page = new Page(createElement(Note))
+    await shown(<Note />)
     serve(() => refusal(409, { parameter: 'a', limit: '2' }))
-    await page.after(() => press(button(page)))
-    await new Promise((resolve) => setTimeout(resolve, 2))
-    expect(button(page).children).toEqual(['Undo anyway'])
-    await page.after(() => remember(drive, 'gains', { before: { a: 7 }, after: { a: 8 } }))
+    await press('Undo')
+    await nextMillisecond()
+    expect(screen.queryByRole('button', { name: 'Undo anyway' })).not.toBeNull()
+    await settled(() => remember(drive, 'gains', { before: { a: 7 }, after: { a: 8 } }))
     serve(() => ({ before: {}, after: {} }))
-    await page.after(() => press(button(page)))
+    await press('Undo')
+    await settled()
     expect(sent()).toEqual({ before: { a: 7 }, after: { a: 8 } })
   })
 
@@ -60,8 +63,7 @@ describe('an undo', () => {
     const list = JSON.parse(localStorage.getItem(place) ?? '[]') as object[]
     localStorage.setItem(place, JSON.stringify([...list, other]))
     remember(drive, 'candidate', { before: { c: 1 } })
-    const page = new Page(createElement(Note))
-    await page.after()
+    await shown(<Note />)
     expect(changes.map((each) => each.what)).toEqual(['gains', 'notches', 'candidate'])
   })
 })
@@ -92,11 +94,10 @@ describe('parameters in a form', () => {
         ? [{ key: 'k', ok: true, reading: reading(9, '2026-11-21T10:00:05Z'), problem: null }]
         : 404,
     )
-    const page = new Page(
-      createElement(ParameterFields, { drive, keys: ['k'], onWritten: written }),
-    )
-    await page.after(() => setEdit(drive, 'k', { text: '9', asRaw: true }))
-    await page.after(() => press(page.named('Button', 'Write (1)')))
+    await shown(<ParameterFields drive={drive} keys={['k']} onWritten={written} />)
+    await type(screen.getByRole('textbox', { name: 'Gain' }), '9')
+    await press('Write (1)')
+    await settled()
     expect(written).toHaveBeenCalledWith({ k: 5 }, { k: 9 })
   })
 })

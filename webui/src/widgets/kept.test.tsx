@@ -1,4 +1,6 @@
-import '../testing/browser'
+// @vitest-environment happy-dom
+import '../testing/page'
+import { act, renderHook } from '@testing-library/react'
 import { expect, it, vi } from 'vitest'
 import { currentSession, keep as keepSession, mayHaveStop } from '../app/session'
 import { storedPlace, storePlace } from '../app/tour/steps'
@@ -7,7 +9,6 @@ import { setLanguage } from '../i18n'
 import { subscribe } from '../live/store'
 import { useRemembered } from '../pages/motion/remembered'
 import { EMPTY, storedSetup, storeSetup } from '../pages/scope/setup'
-import { Shallow } from '../testing/shallow'
 import { setOriginal } from './profile-text/texts'
 
 const refuse = () => {
@@ -25,24 +26,19 @@ it('opens a session, with STOP, in a browser that keeps nothing', () => {
   expect(mayHaveStop()).toBe(true)
 })
 
-it('takes numbers and choices in a browser that keeps nothing', async () => {
-  const field = new Shallow(() => {
-    const [value, change] = useRemembered('x', 'jog.speed', 60)
-    return { value, change } as never
-  }, {})
-  const shown = () =>
-    (field as unknown as { tree: { value: number; change: (n: number) => void } }).tree
-  expect(shown().value).toBe(60)
-  await field.act(() => shown().change(30))
-  expect(shown().value).toBe(30)
+it('takes numbers and choices in a browser that keeps nothing', () => {
+  const { result } = renderHook(() => useRemembered('x', 'jog.speed', 60))
+  expect(result.current[0]).toBe(60)
+  act(() => result.current[1](30))
+  expect(result.current[0]).toBe(30)
   expect(storedSetup()).toBeNull()
-  for (const act of [
+  for (const store of [
     () => storeSetup(EMPTY),
     () => storePlace('left'),
     () => setLanguage('en'),
     () => setOriginal(true),
   ]) {
-    expect(act).not.toThrow()
+    expect(store).not.toThrow()
   }
   expect(storedPlace()).toBe('offer')
 })
