@@ -8,11 +8,6 @@ import { setLink } from '../../live/store'
 import { NotchEditor } from './NotchEditor'
 import { merged, type Notches, useNotches } from './useNotches'
 
-<<<<<<< HEAD:webui/src/pages/response/notches.test.ts
-vi.mock('@mantine/core', () => import('../../testing/mantine'))
-
-=======
->>>>>>> h-p:webui/src/pages/response/notches.test.tsx
 const slot = (number: number, center_hz: number | null): NotchSlotInfo => ({
   slot: number,
   enabled: center_hz !== null,
