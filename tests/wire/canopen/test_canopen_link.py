@@ -58,7 +58,7 @@ async def test_an_abort_comes_back_in_words(link: CanopenLink) -> None:
     assert "does not accept this value" in str(refused.value)
     assert refused.value.parameter == "2001:00"
     assert refused.value.drive is not None
-    assert "node 5" in refused.value.drive
+    assert "node 5" in str(refused.value.drive)
     with pytest.raises(Rejected, match="no such object"):
         await link.read(5, Address(0x2FFF, 0, "UINT8"))
 
