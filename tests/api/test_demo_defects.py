@@ -24,7 +24,6 @@ from drivers.virtual.defects import (
     DEFECT_WORDS,
     OUT_OF_SQUARE_RAD,
     SLIPS,
-    WORN_BACKLASH_RAD,
     Defect,
 )
 from drivers.virtual.wires.netns import unavailable
@@ -203,13 +202,3 @@ def test_the_gantry_tool_finds_a_beam_out_of_square(gantry: Demo) -> None:
     report = gantry.report("Left")
     assert "The gantry is out of square" in report
     assert "Correct the reference (homing offset)" in report
-
-
-def test_the_load_side_tool_finds_the_backlash_of_a_worn_belt(gantry: Demo) -> None:
-    gantry.exchange(2000, "ethercat://virtual1")
-    asked = {**LIMITS, "speed_limit": 1200.0, "torque_limit": 80.0, "time_limit_s": 90.0}
-    result = gantry.measured("Table", "load-side", **asked, motor_inertia_kgm2=5e-5)
-    assert result["backlash_deg"]["value"] == pytest.approx(
-        math.degrees(WORN_BACKLASH_RAD), rel=0.05
-    )
-    assert "check coupling, keys, belt tension and gear" in gantry.report("Table")
