@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 
@@ -23,6 +24,9 @@ def move_into_place(source: Path, target: Path) -> None:
         try:
             source.replace(target)
         except PermissionError:
+            # In a folder that may not be written, waiting changes nothing.
+            if not os.access(target.parent, os.W_OK):
+                raise
             time.sleep(pause_s)
         else:
             return

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
 _NAMESPACE = "http://schemas.microsoft.com/windows/2004/02/mit/task"
-#: A task of the scheduler is ended after three days and when the battery takes over, unless it is
-#: told otherwise; a server with an axis in motion must not be. A second start is refused by the
-#: lock of the state folder as well.
+#: The scheduler ends a task after three days and when the battery takes over, unless its file
+#: states otherwise: a server with an axis in motion must not be ended. A second start is refused
+#: by the lock of the state folder as well.
 _TASK = """\
 <?xml version="1.0" encoding="UTF-16"?>
 <Task version="1.2" xmlns="{namespace}">

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from drivers.computer.packet_capture import Registry, windows_registry
+from drivers.computer.registry import REGISTRY, RegistryValue
 
 FOLDERS_MOVE_WHILE_OPEN = sys.platform != "win32"
 """Whether a folder can be renamed while a process has a file in it open."""
@@ -17,7 +17,7 @@ _FILE_SYSTEM = r"SYSTEM\CurrentControlSet\Control\FileSystem"
 _MAX_PATH = 259
 
 
-def longest_path(registry: Registry = windows_registry) -> int | None:
+def longest_path(registry: RegistryValue = REGISTRY.value) -> int | None:
     """Return the characters that a path may have; None where no limit is in the way.
 
     CPython allows longer paths on Windows where the computer has the setting LongPathsEnabled.

@@ -13,12 +13,13 @@ import ctypes
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from drivers.computer.registry import REGISTRY, RegistryValue
 from drivers.texts.message import Text, text
 
 NPCAP_LEAST = (1, 0)
@@ -34,9 +35,6 @@ _BPF = "/dev/bpf0"
 _DEVICE = "\\Device\\"
 NPF_NAME = re.compile(r"NPF_\{[0-9A-F]{8}(?:-[0-9A-F]{4}){3}-[0-9A-F]{12}\}", re.IGNORECASE)
 """Form of Windows adapter names in bus URLs: the device's name without its folder."""
-
-Registry = Callable[[str, str], str | int | None]
-"""A value below HKEY_LOCAL_MACHINE by key and name; None if it does not exist."""
 
 
 class Capture(StrEnum):
@@ -92,21 +90,7 @@ class CaptureState:
         return text("computer.allow-bpf")
 
 
-def windows_registry(key: str, name: str) -> str | int | None:
-    """Return a value below HKEY_LOCAL_MACHINE; None without it, or on another system."""
-    if sys.platform == "win32":
-        import winreg
-
-        try:
-            with winreg.OpenKey(winreg.HKEY_LOCAL_MACHINE, key) as opened:
-                value, _ = winreg.QueryValueEx(opened, name)
-        except OSError:
-            return None
-        return value if isinstance(value, str | int) else None
-    return None
-
-
-def npcap_state(registry: Registry, *, administrator: bool) -> CaptureState:
+def npcap_state(registry: RegistryValue, *, administrator: bool) -> CaptureState:
     """Determine the state of Npcap from the registry.
 
     A version that the registry does not state is accepted.
@@ -133,7 +117,7 @@ def capture_state() -> CaptureState:
     """Determine whether frames can be sent and received by packet capture on this computer."""
     if sys.platform == "win32":
         administrator = bool(ctypes.windll.shell32.IsUserAnAdmin())
-        return npcap_state(windows_registry, administrator=administrator)
+        return npcap_state(REGISTRY.value, administrator=administrator)
     elif sys.platform == "darwin":  # noqa: RET505 - type checkers follow the branches of a system
         return bpf_state()
     return CaptureState(Capture.READY)

@@ -13,6 +13,7 @@ from backend.library.backup.backup import make_backup
 from backend.library.backup.restore import restore
 from backend.restore import store as restore_store
 from backend.store.files import StorageFailed, write_atomically
+from profiles.replacing import move_into_place
 from tests.store.test_backup import Station, reopened
 from tests.support.windows_files import keep_rules
 
@@ -121,3 +122,20 @@ def test_a_file_that_stays_open_elsewhere_is_a_clear_error_and_unharmed(
     assert "OneDrive" in (caught.value.remedy or "")
     assert target.read_text() == "old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_a_folder_without_permission_is_an_error_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The caller can be the event loop of a server: it must not wait where that changes nothing."""
+    attempts: list[str] = []
+
+    def refused(source: str, goal: str) -> None:
+        attempts.append(goal)
+        raise PermissionError(13, "Permission denied", str(goal))
+
+    monkeypatch.setattr(os, "replace", refused)
+    monkeypatch.setattr(os, "access", lambda _path, _mode: False)
+    with pytest.raises(PermissionError):
+        move_into_place(tmp_path / "new", tmp_path / "bench.json")
+    assert len(attempts) == 1

@@ -51,7 +51,7 @@ _COMMANDED = text("sweep.torque-is-commanded")
 _SLOW = text("sweep.torque-follows-slowly")
 _SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
 _DROPPED = text("sweep.torque-not-used")
-_STANDS = text("sweep.load-does-not-follow")
+_LOAD_DOES_NOT_FOLLOW = text("sweep.load-does-not-follow")
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +196,7 @@ def _load_side(
         return None, ()
     scale = scale_of(taken, counts)
     if scale is None:
-        return None, (_STANDS,)
+        return None, (_LOAD_DOES_NOT_FOLLOW,)
     frf = load_response(
         taken,
         [each / scale.counts_per_rad for each in counts],

@@ -10,13 +10,14 @@ from types import SimpleNamespace
 import pytest
 
 from drivers.computer import latency_timer
+from drivers.computer import registry as registry_module
 from drivers.computer.latency_timer import (
     InForce,
     LatencyTimer,
     LatencyTimers,
-    WindowsRegistry,
     restart_device,
 )
+from drivers.computer.registry import REGISTRY
 from tests.support.registry import ENUM, PARAMETERS, Hive, winreg
 
 SINGLE = r"FTDIBUS\VID_0403+PID_6001+A50285BIA\0000"
@@ -43,6 +44,7 @@ def hive(monkeypatch: pytest.MonkeyPatch) -> Hive:
         platform="win32", getwindowsversion=lambda: SimpleNamespace(build=22631)
     )
     monkeypatch.setattr(latency_timer, "sys", windows)
+    monkeypatch.setattr(registry_module, "sys", windows)
     return hive
 
 
@@ -209,7 +211,7 @@ def test_windows_before_version_2004_cannot_restart_it(
 
 
 def test_a_system_without_a_registry() -> None:
-    registry = WindowsRegistry()
+    registry = REGISTRY
     assert registry.keys(ENUM) == []
     assert registry.value(ENUM, "Count") is None
     with pytest.raises(OSError, match="no registry"):

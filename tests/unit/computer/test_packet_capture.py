@@ -12,11 +12,11 @@ from drivers.adapters import require_ethercat_adapter
 from drivers.computer.locks import hold_file
 from drivers.computer.packet_capture import (
     Capture,
-    Registry,
     adapters,
     bpf_state,
     npcap_state,
 )
+from drivers.computer.registry import RegistryValue
 from drivers.errors import OutOfRange
 
 SERVICE = r"SYSTEM\CurrentControlSet\Services\npcap"
@@ -29,7 +29,7 @@ INSTALLED = {
 GUID = "{4D36E972-E325-11CE-BFC1-08002BE10318}"
 
 
-def registry(values: Mapping[tuple[str, str], str | int]) -> Registry:
+def registry(values: Mapping[tuple[str, str], str | int]) -> RegistryValue:
     return lambda key, name: values.get((key, name))
 
 

@@ -1,7 +1,7 @@
 """The frequency response of the load next to that of the motor, by the drive's own object 60E4h.
 
 Truth follows from the equations of motion of two inertias and a spring; the encoder's scale is not
-told to the tool.
+an input of the tool.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ export interface StopReport {
 }
 
 /**
- * The quick stop goes out within less than this. A network that swallows everything keeps a request
- * waiting for minutes; whoever stands at the machine must not wait for it.
+ * The quick stop goes out within less than this. On a network that loses everything a
+ * request waits for minutes, and a person at the machine must not.
  */
 const TAKEN_MS = 3000
 
@@ -60,7 +60,7 @@ export async function stopEverything(): Promise<void> {
   waiting = mine.at
   publish('stop')
   setTimeout(() => {
-    if (report?.at === mine.at && !report.taken) doubt()
+    if (report?.at === mine.at && !report.taken) reportUnknown()
   }, TAKEN_MS)
   try {
     const answer = await request
@@ -79,12 +79,12 @@ export async function stopEverything(): Promise<void> {
 export function listenForAnswers(): void {
   subscribe('stopTaken', () => {
     if (report === null || report.answer !== null) return
-    // What was doubted for want of an answer is known now; a request that failed says no more.
+    // An answer that was missing has come; a request that failed is still a failure.
     report = { ...report, taken: true, failure: waiting === report.at ? null : report.failure }
     publish('stop')
   })
   subscribe('link', () => {
-    if (!contents.link.open) doubt()
+    if (!contents.link.open) reportUnknown()
   })
   subscribe('stopReached', () => {
     const reached = contents.stopReached
@@ -94,8 +94,8 @@ export function listenForAnswers(): void {
   })
 }
 
-/** Nothing says that the axes stand: the emergency stop of the machine is named. */
-function doubt(): void {
+/** No answer confirms that the axes stand: the page refers to the machine's emergency stop. */
+function reportUnknown(): void {
   if (report === null || report.answer !== null || report.failure !== null) return
   report = { ...report, failure: 'unknown' }
   publish('stop')
