@@ -254,7 +254,13 @@ def evaluate(moves: Moves, settings: ShapingSettings, seen: Seen | None) -> Shap
         trace_s=traces[0], trace_unshaped=traces[1], trace_shaped=traces[2],
     )  # fmt: skip
     findings, values = _findings(result, moves, settings, lost)
-    return result.model_copy(update={"findings": tuple(findings), "drive_values": tuple(values)})
+    return result.model_copy(
+        update={
+            "findings": tuple(findings),
+            "drive_values": tuple(values),
+            "family": moves.filter.family,
+        }
+    )
 
 
 def extra_samples(shaper: Shaper, rate: float) -> int:

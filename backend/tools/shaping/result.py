@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from backend.analysis.signals.shaper import Kind
 from backend.tools.tool import Interval, ToolResult
+from drivers.texts.message import Language
+from drivers.texts.profile_words import ProfileWords
 
 Verdict = Literal["verified", "improved", "no_better", "designed", "stated", "not_seen"]
 """Verdict on the shaper.
@@ -139,6 +141,8 @@ class DriveFilter(_Part):
     slot: FilterSlot | None = None
     also: tuple[ShapingDriveValue, ...] = ()
     unstated: tuple[str, ...] = ()
+    family: str = ""
+    """The drive's profile, for the names of its parameters in other languages."""
 
     def values_for(self, period_s: float) -> list[ShapingDriveValue]:
         """Parameter values of the filter for this period; empty where it is out of range."""
@@ -170,7 +174,14 @@ class ShapingResult(ToolResult):
     chosen: Kind | None
     comparison: ShapingComparison | None
     drive_values: tuple[ShapingDriveValue, ...] = ()
+    family: str = Field(default="", description="profile of the drive; empty in older files")
     trace_s: tuple[float, ...] = Field(default=(), description="from the end of the unshaped move")
     trace_unshaped: tuple[float, ...] = ()
     trace_shaped: tuple[float, ...] = ()
     findings: tuple[ShapingFinding, ...] = ()
+
+    def in_language(self, language: Language) -> Self:
+        """The same result with the names of the drive's parameters in this language."""
+        say = ProfileWords(self.family, language)
+        named = (each.model_copy(update={"name": say(each.name)}) for each in self.drive_values)
+        return self.model_copy(update={"drive_values": tuple(named)})

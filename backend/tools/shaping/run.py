@@ -167,7 +167,7 @@ def _filter_of(drive: Drive) -> DriveFilter:
     """The drive's own filter against slow vibration, by its profile."""
     spec = drive.profile.slow_vibration
     if spec is None:
-        return DriveFilter()
+        return DriveFilter(family=drive.profile.drive)
     key = spec.frequency or spec.period
     also = tuple(
         _value(drive.parameter(name), raw)
@@ -175,9 +175,10 @@ def _filter_of(drive: Drive) -> DriveFilter:
         if not drive.unreachable_why(drive.parameter(name))
     )
     if key is None or drive.unreachable_why(drive.parameter(key)):
-        return DriveFilter()
+        return DriveFilter(family=drive.profile.drive)
     parameter = drive.parameter(key)
     return DriveFilter(
+        family=drive.profile.drive,
         takes="frequency" if spec.frequency else "period",
         slot=FilterSlot(
             parameter=parameter.number or parameter.key,

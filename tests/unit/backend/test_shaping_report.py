@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, get_args
 
 import pytest
@@ -23,6 +24,7 @@ from backend.tools.shaping.result import (
 )
 from backend.tools.shaping.run import TOOL
 from backend.tools.shaping.settings import ShapingSettings
+from profiles.loader import load_profile
 
 MODE = ShapingMode(
     frequency_hz=8.0, frequency_ci95_hz=(7.9, 8.1), damping=0.02, damping_ci95=(0.01, 0.03),
@@ -71,6 +73,21 @@ def test_lines_of_the_command() -> None:
     )
     assert "Frequency of the mode: 8 Hz (7.9 to 8.1)" in lines
     assert any("ZV, played" in each and "52.00 / 48.00" in each for each in lines)
+
+
+def test_the_drives_own_parameter_has_its_name_in_chinese() -> None:
+    key = load_profile("m6l").slow_vibration
+    assert key is not None
+    parameter = load_profile("m6l").by_key[str(key.frequency or key.period)]
+    value = ShapingDriveValue(
+        parameter=str(parameter.number), name=parameter.name, raw=80, value=8.0, unit="Hz"
+    )
+    result = made(drive_values=(value,), family="m6l")
+    (chinese,) = result.in_language("zh").drive_values
+    assert re.search("[\u4e00-\u9fff]", chinese.name)
+    assert result.in_language("en").drive_values == (value,)
+    # A file of an older version names no family.
+    assert made(drive_values=(value,)).in_language("zh").drive_values == (value,)
 
 
 def test_a_filter_takes_the_frequency_or_the_period_within_its_range() -> None:

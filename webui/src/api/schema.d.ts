@@ -12252,6 +12252,12 @@ export interface components {
              */
             drive_values: components["schemas"]["ShapingDriveValue"][];
             /**
+             * Family
+             * @description profile of the drive; empty in older files
+             * @default
+             */
+            family: string;
+            /**
              * Findings
              * @default []
              */
