@@ -11,7 +11,7 @@ from backend.api.station import adapters as routes
 from backend.preflight.adapters import Adapters
 from drivers.computer.latency_timer import LatencyTimers
 from tests.support.station import Station
-from tests.unit.preflight.test_adapters import OnePort
+from tests.unit.preflight.test_latency_list import OnePort
 
 PATH = "/adapters/latency-timer"
 COM3 = {"device": "COM3"}
