@@ -8,8 +8,9 @@ import numpy as np
 
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.measured_plant import measured_plant
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.candidates import candidates_for
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
@@ -17,7 +18,6 @@ from backend.tools.inertia.evaluation import Scheme
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import put_back
 from backend.tools.sweep.evaluation import completed
-from backend.work.jobs import Progress
 from benchmarks._tune_figures import marked, true_modes
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.rig import WIDE

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import get_args
 
-from backend.handover.files import Format
+from backend.records.handover.files import Format
 from tests.support.controllers.acceptance import outcome, table
 from tests.support.handed_over import EVERY
 

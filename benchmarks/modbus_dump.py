@@ -20,8 +20,8 @@ from multiprocessing.synchronize import Event
 
 from pymodbus.client import ModbusSerialClient
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from drivers.modbus.line_url import line_settings
 from drivers.modbus.link import modbus_link
 from drivers.modbus.registers import words_of

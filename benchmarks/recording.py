@@ -26,10 +26,10 @@ from pathlib import Path
 
 import numpy as np
 
-from backend.recording.chunks import samples_chunk
-from backend.recording.export import export
-from backend.recording.rerun_assets import free_port
-from backend.recording.writer import MAX_QUEUED_BYTES, RecordingWriter
+from backend.records.recording.chunks import samples_chunk
+from backend.records.recording.export import export
+from backend.records.recording.rerun_assets import free_port
+from backend.records.recording.writer import MAX_QUEUED_BYTES, RecordingWriter
 from benchmarks._aims import Aim, print_verdict
 from drivers.link import ScopeBlock
 

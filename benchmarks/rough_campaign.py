@@ -32,6 +32,7 @@ from unittest.mock import patch
 
 import numpy as np
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import apply, present
 from backend.tools.autotune import verify as verification
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
@@ -40,7 +41,6 @@ from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from benchmarks._rough_cases import CLASSES, Case, case_of
 from benchmarks._true_loop import true_margins
 from benchmarks._tune_figures import true_modes

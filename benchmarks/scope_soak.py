@@ -36,7 +36,7 @@ import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from backend.commands.server.serve import settle
-from backend.recording.reader import RecordingReader
+from backend.records.recording.reader import RecordingReader
 from backend.station.demo import DemoBench
 from benchmarks._aims import Aim, print_verdict
 from tests.support.station import Station

@@ -25,14 +25,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.inertia.evaluation import InertiaOutcome, InertiaSettings, Scheme
 from backend.tools.inertia.run import inertia
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep.evaluation import Loop, SweepResult, SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from benchmarks._best_linear import Raw, best_linear, played_of
 from benchmarks._tune_figures import marked, true_modes
 from benchmarks.autotune_accuracy import tuned

@@ -1473,3 +1473,57 @@ class coupled_stability:
     """[ratio] Origin: tests/unit/analysis/test_coupled_axes.py."""
     STEPS = 80
     """[count] Origin: tests/unit/analysis/test_coupled_axes.py."""
+
+
+class duty_heat:
+    """`duty/heat.py`."""
+
+    WINDING = (0.15, 0.3, 0.5)
+    """[ratio] Share of the rated temperature rise between winding and housing: low, usual, high.
+    Origin: 67963fe4."""
+    WINDING_S = (10.0, 60.0)
+    """[s] Range of the time constant of the winding against the housing. Origin: 67963fe4."""
+    WINDING_SHARE = (0.02, 0.1)
+    """[ratio] The same as a share of the motor's time constant. Origin: 67963fe4."""
+    SPEED_SHARE = (0.0, 0.35)
+    """[ratio] Range of the share of the rated losses that depends on the speed alone. Origin:
+    67963fe4."""
+    SPEED_POWER = (1.0, 2.0)
+    """[count] Range of the exponent of the speed in these losses. Origin: 67963fe4."""
+    STATED = 0.15
+    """[ratio] Relative error of that share where the torque at standstill is stated. Origin:
+    67963fe4."""
+    SATURATION = (0.0, 0.07)
+    """[ratio] Range of the current in excess of torque at three times rated torque, per unit of
+    torque above the rated one. Origin: 67963fe4."""
+    COPPER = (0.0, 0.35)
+    """[ratio] Range of the rise of the copper's resistance: 0.39 %/K at 20 °C, relative to the hot
+    resistance, per rated rise of 60 to 125 K. Origin: 67963fe4."""
+    TIME_CONSTANT = (0.75, 1.3)
+    """[ratio] Range of the time constant: the catalogue's value holds for a motor on some flange.
+    Origin: 67963fe4."""
+    LONGEST = 12.0
+    """[count] Longest time that is searched for the trip, in time constants. Origin: 67963fe4."""
+    MOMENTS = 400
+    """[count] Moments at which the temperature is computed in that search. Origin: 67963fe4."""
+
+
+class duty_load:
+    """`duty/load.py`."""
+
+    GAP_FACTOR = 5.0
+    """[ratio] An interval is a gap if it is longer than this many usual ones, and than `GAP_S`.
+    Origin: 67963fe4."""
+    GAP_S = 0.25
+    """[s] See `GAP_FACTOR`. Origin: 67963fe4."""
+    REPEATS = 0.8
+    """[ratio] A period counts if the correlation of the signals one period apart is at least this.
+    Origin: 67963fe4."""
+    NEARLY = 0.97
+    """[ratio] A period is preferred to its multiple if its correlation is at least this share of
+    the best one. Origin: 67963fe4."""
+    FALLEN = 0.5
+    """[ratio] The correlation must have fallen below this before a period is searched. Origin:
+    67963fe4."""
+    MOST_SAMPLES = 65536
+    """[count] Samples over which a period is searched at most. Origin: 67963fe4."""

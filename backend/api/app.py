@@ -52,9 +52,9 @@ from backend.api.station import preflight as routes_preflight
 from backend.api.station import routes as routes_bench
 from backend.api.station.box import routes as routes_box
 from backend.api.tuning import measure as routes_tune
-from backend.functions.forcing import ForcingSessions
-from backend.people.station import People
-from backend.recording.rerun_assets import ViewerAssets
+from backend.axes.functions.forcing import ForcingSessions
+from backend.foundation.people.station import People
+from backend.records.recording.rerun_assets import ViewerAssets
 from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
 from backend.station.recording.rerun_feed import RerunFeed

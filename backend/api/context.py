@@ -11,9 +11,9 @@ from typing import Annotated
 from fastapi import Depends, Header, Request
 
 from backend.api.errors import NotFound
-from backend.people.errors import NotLoggedIn
-from backend.people.identity import Identity, acting
-from backend.people.station import People
+from backend.foundation.people.errors import NotLoggedIn
+from backend.foundation.people.identity import Identity, acting
+from backend.foundation.people.station import People
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed

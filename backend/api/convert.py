@@ -10,20 +10,20 @@ from backend.api.drive.convert_stop import turning
 from backend.api.errors import message_of, message_or_none, problem_of, words_of
 from backend.api.sets import models as models_sets
 from backend.api.station import models as models_bench
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.motion.alternatives import alternative_of
-from backend.motion.classes import motion_of
-from backend.parameters.set_file import Difference
-from backend.people.elapsed import moment_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.alternatives import alternative_of
+from backend.axes.motion.classes import motion_of
+from backend.axes.parameters.set_file import Difference
+from backend.foundation.people.elapsed import moment_of
+from backend.foundation.work.jobs import Job
+from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.matching import match_profiles
 from backend.station.monitor import Snapshot
 from backend.tools.moves.procedures import describe
 from backend.tools.spoken import result_in_language
-from backend.work.jobs import Job
-from backend.work.journal import Entry
 from drivers import cia402
 from drivers.cia402 import Mode
 from drivers.link import Found, Link, LinkQuality

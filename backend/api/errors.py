@@ -13,7 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from backend.api.models import Problem
-from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
+from backend.foundation.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from backend.tools.wire_message import MessageInfo
 from drivers.errors import (
     Busy,

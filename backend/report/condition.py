@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from backend.health.records import Baseline, Condition
-from backend.health.words import message_of
 from backend.report.document import Block, Note, Table
 from backend.report.texts import Words
 from backend.tools.measuring.numbers import moment
+from backend.tools.trend.records import Baseline, Condition
+from backend.tools.trend.words import message_of
 
 
 def condition(found: Condition, baseline: Baseline, words: Words) -> list[Block]:

@@ -7,10 +7,15 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import backend
-from backend.drive.drive import Drive
-from backend.handover.conflicts import changed_since
-from backend.handover.record import HandedOver
-from backend.library.measurements import BadMeasurement, Head, MeasurementStore, profile_version
+from backend.axes.drive.drive import Drive
+from backend.records.handover.conflicts import changed_since
+from backend.records.handover.record import HandedOver
+from backend.records.library.measurements import (
+    BadMeasurement,
+    Head,
+    MeasurementStore,
+    profile_version,
+)
 from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, HandedOverFile, Identity, Measured
 from backend.report.tools import result_of, verdict_of

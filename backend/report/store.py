@@ -7,11 +7,11 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
+from backend.foundation.store.files import checked_name, files_of, shown_name, write_atomically
 from backend.report.compose import compose
 from backend.report.document import Language
 from backend.report.facts import Facts
 from backend.report.html import render_html
-from backend.store.files import checked_name, files_of, shown_name, write_atomically
 from drivers.errors import NotAllowed
 
 Format = Literal["html", "pdf"]

@@ -6,7 +6,7 @@ from itertools import cycle
 
 from pydantic import ValidationError
 
-from backend.library.measurements import BadMeasurement
+from backend.records.library.measurements import BadMeasurement
 from backend.report.document import Block, Figure, Note, Table
 from backend.report.plot import Curve, Plot
 from backend.report.texts import Words

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.scales.gear_calculator import Mechanics
-from backend.scales.units import AxisUnits
+from backend.axes.scales.gear_calculator import Mechanics
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scope.hub import Subscription
 from backend.scene.geometry import Track, Travel, track_of, travel_of
-from backend.scope.hub import Subscription
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.cia402 import State

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.scales.gear_calculator import Mechanics
 from drivers.errors import OutOfRange
 
 #: Half the length of a track in the scene.

@@ -14,7 +14,7 @@ from typing import Literal
 
 import viser
 
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.scales.gear_calculator import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, Travel, turn
 
 #: Distance of two axes; the page's camera uses it too (webui/src/pages/scene/SceneFrame.tsx).

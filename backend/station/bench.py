@@ -10,20 +10,23 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from backend.audit.recorder import AuditRecorder
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.axis.remembered import AxisStore
-from backend.drive.drive import Drive
-from backend.drive.identity import place_of, read_serial
-from backend.drive.ports import Port
-from backend.drive.readings import Reading
-from backend.library.measurements import MeasurementStore
-from backend.motion.authority import MotionAuthority
-from backend.people.lease import Leases
-from backend.restore.store import RestoreStore
-from backend.scales.taught import TaughtDrive
-from backend.scope.hub import ScopeHub
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.remembered import AxisStore
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import place_of, read_serial
+from backend.axes.drive.ports import Port
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.authority import MotionAuthority
+from backend.axes.restore.store import RestoreStore
+from backend.axes.scales.taught import TaughtDrive
+from backend.axes.scope.hub import ScopeHub
+from backend.foundation.people.lease import Leases
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.work.jobs import Job, JobRunner
+from backend.foundation.work.journal import Journal, Level
+from backend.records.audit.recorder import AuditRecorder
+from backend.records.library.measurements import MeasurementStore
 from backend.station.buses import Buses
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.doctor import Doctor
@@ -35,9 +38,6 @@ from backend.station.motion import Motion
 from backend.station.naming import PlaceNames, new_id
 from backend.station.reconnection import Reconnection
 from backend.station.records import Records
-from backend.store.files import StorageFailed
-from backend.work.jobs import Job, JobRunner
-from backend.work.journal import Journal, Level
 from drivers.errors import Busy, DriveError, NotAllowed, why_of
 from drivers.link import Found, Link
 from drivers.texts.message import Text, text

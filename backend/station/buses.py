@@ -6,9 +6,9 @@ import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.people.identity import by_itself
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.foundation.people.identity import by_itself
 from backend.station.box.roles import require_not_office
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent

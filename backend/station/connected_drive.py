@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
 from backend.station.monitor import Monitor
 
 

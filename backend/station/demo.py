@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.scales.gear_calculator import Mechanics
 from drivers.computer.processes import SESSIONS
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.ethercat.link import EthercatLink

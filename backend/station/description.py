@@ -7,7 +7,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from backend.work.apart import answer_of
+from backend.foundation.work.apart import answer_of
 from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found, Link, Progress

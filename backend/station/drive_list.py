@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
-from backend.store.files import StorageFailed, write_atomically
+from backend.foundation.store.files import StorageFailed, write_atomically
 from drivers.texts.message import Text, Unsuitable, prose, text
 from drivers.texts.validation import reason_of
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from backend.library.measurements import BadMeasurement, Measurement
-from backend.response_import import stored as response_import
+from backend.records.library.measurements import BadMeasurement, Measurement
+from backend.records.response_import import stored as response_import
 from backend.tools.registry import BY_KIND
 from drivers.texts.message import reason_of
 

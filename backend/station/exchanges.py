@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.cyclic import CyclicSession
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.texts.message import text
 

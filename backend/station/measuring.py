@@ -6,12 +6,12 @@ import asyncio
 import contextlib
 from dataclasses import dataclass
 
-from backend.axis.cyclic import CyclicSession
-from backend.drive.ports import Port
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.ports import Port
+from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.sweep import profile_speed
-from backend.work.jobs import Job
 from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import text
 

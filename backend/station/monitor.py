@@ -11,13 +11,13 @@ import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from backend.axis.axis import Axis
-from backend.drive.faults import active_faults, fault_keys, integer
-from backend.drive.readings import Reading
-from backend.people.identity import by_itself
-from backend.scales.units import AxisUnits
-from backend.stopping.turning import Turning, TurnWatch, turning_message
-from backend.work.journal import Journal, Level
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.faults import active_faults, fault_keys, integer
+from backend.axes.drive.readings import Reading
+from backend.axes.scales.units import AxisUnits
+from backend.axes.stopping.turning import Turning, TurnWatch, turning_message
+from backend.foundation.people.identity import by_itself
+from backend.foundation.work.journal import Journal, Level
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, internal_error

@@ -9,17 +9,17 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from backend.axis.stop.facts import AxisStop, Verdict
+from backend.axes.axis.stop.facts import AxisStop, Verdict
+from backend.axes.stopping.stop_message import stop_message
+from backend.axes.stopping.watch import StopWatch
 from backend.station.connected_drive import ConnectedDrive
-from backend.stopping.stop_message import stop_message
-from backend.stopping.watch import StopWatch
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, internal_error
 from drivers.texts.message import Text, text
 
 if TYPE_CHECKING:
+    from backend.foundation.work.jobs import Job
     from backend.station.bench import Bench
-    from backend.work.jobs import Job
 
 log = logging.getLogger(__name__)
 

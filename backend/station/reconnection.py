@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.identity import confirm_identity
-from backend.restore.identity import identity_of
-from backend.restore.keep import keep_list
-from backend.restore.store import RestoreStore
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import confirm_identity
+from backend.axes.restore.identity import identity_of
+from backend.axes.restore.keep import keep_list
+from backend.axes.restore.store import RestoreStore
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.monitor import Snapshot
-from backend.store.files import StorageFailed
 from backend.tools.measuring.restore import settle
-from backend.work.jobs import Job, JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found

@@ -7,17 +7,17 @@ import contextlib
 import socket
 from pathlib import Path
 
-from backend.audit import AuditLog
-from backend.audit.trail import Trail
-from backend.library import Library, LibrarySets
-from backend.library.described import folders
-from backend.library.index import Index
-from backend.store import state_version
-from backend.store.blobs import Blobs
-from backend.store.database import DatabaseFailed, Store
-from backend.store.files import StorageFailed
-from backend.store.lock import FolderLock
-from backend.work.journal import Journal
+from backend.foundation.store import state_version
+from backend.foundation.store.blobs import Blobs
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.lock import FolderLock
+from backend.foundation.work.journal import Journal
+from backend.records.audit import AuditLog
+from backend.records.audit.trail import Trail
+from backend.records.library import Library, LibrarySets
+from backend.records.library.described import folders
+from backend.records.library.index import Index
 from drivers.errors import Busy, with_remedy
 from drivers.texts.message import Text, text
 

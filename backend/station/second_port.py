@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port, carries
-from backend.parameters.set_file import storable
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port, carries
+from backend.axes.parameters.set_file import storable
 from drivers.errors import LinkTimeout, NotAllowed
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind

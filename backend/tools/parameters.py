@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from backend.drive.drive import Drive
-from backend.drive.identity import confirm_identity
-from backend.drive.readings import Reading
-from backend.library import SetStore
-from backend.library.identity import differences
-from backend.motion.grant import NotGranted
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import ParameterSet
-from backend.work.jobs import JobResult
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import confirm_identity
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.grant import NotGranted
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import ParameterSet
+from backend.foundation.work.jobs import JobResult
+from backend.records.library import SetStore
+from backend.records.library.identity import differences
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, with_remedy
 from drivers.link import Progress
 from drivers.texts.answers import sentence

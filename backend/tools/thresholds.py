@@ -1385,3 +1385,137 @@ class dwell_run:
     """[count] Steps of the setpoint that an amplitude has at least. Origin: docs/vibration.md."""
     LIVE_S = 0.3
     """[s] The amplitude that is shown meanwhile is of so long. Origin: docs/vibration.md."""
+
+
+class trend_compare:
+    """`trend/compare.py`."""
+
+    FALSE_ALARMS = 0.01
+    """[ratio] Probability of a false alarm in one comparison of an axis, for all quantities
+    together. Origin: b68b54c1 with tests/unit/health."""
+    LEAST_REPEATS = 3
+    """[count] Smallest number of repeats; with fewer the spread is not known well enough. Origin:
+    b68b54c1 with tests/unit/health."""
+    CHECKS = 2
+    """[count] Number of newest checks that are compared. Origin: b68b54c1 with
+    tests/unit/health."""
+    JUDGED = 2
+    """[count] Number of resonances that are judged; further ones are shown only. Origin: b68b54c1
+    with tests/unit/health."""
+    ANOTHER = 1.5
+    """[ratio] A resonance that differs by more than this factor is a different one. Origin:
+    b68b54c1 with tests/unit/health."""
+    FINEST = 1e-3
+    """[ratio] Smallest relative standard deviation that is assumed, however well repeats agree.
+    Origin: b68b54c1 with tests/unit/health."""
+
+
+class trend_permission:
+    """`trend/permission.py`."""
+
+    KEPT = 50
+    """[count] Number of attempts that are stored with a permission. Origin: b68b54c1."""
+
+
+class cycle_evaluate:
+    """`cycle/evaluate.py`."""
+
+    FEWEST = 20
+    """[count] Smallest number of samples that is evaluated. Origin: 67963fe4."""
+    IDLE_PERCENT = 0.5
+    """[%] Below this torque, of the rated one, and `IDLE_RPM`, the axis is idle. Origin:
+    67963fe4."""
+    IDLE_RPM = 1.0
+    """[rpm] See `IDLE_PERCENT`. Origin: 67963fe4."""
+    AT_LIMIT = 0.98
+    """[ratio] A torque peak from this share of the limit on is limited by it. Origin: 67963fe4."""
+    OVER_SPEED = 1.02
+    """[ratio] A speed up to this factor of the rated speed is accepted. Origin: 67963fe4."""
+    SLOW_HZ = 50.0
+    """[Hz] Slower sampling misses short acceleration peaks, and the result says so. Origin:
+    67963fe4."""
+    CELLS = 40
+    """[count] Cells of the cloud in each direction; one sample of each is shown. Origin:
+    67963fe4."""
+
+
+class cycle_run:
+    """`cycle/run.py`."""
+
+    SLOW_S = 1.0
+    """[s] Interval for reading slowly changing values. Origin: 67963fe4."""
+    STEP_S = 0.25
+    """[s] Interval at which the progress is reported. Origin: 67963fe4."""
+
+
+class cycle_texts:
+    """`cycle/texts.py`."""
+
+    BINS = 24
+    """[count] Bins of speed in the drawing of torque over speed. Origin: 67963fe4."""
+
+
+class safety_check_evaluate:
+    """`safety_check/evaluate.py`."""
+
+    LEFT = 0.9
+    """[ratio] A speed below this share of the commanded one, for `LASTS_S`, is a sign of the
+    function. Origin: 653af5ab."""
+    LASTS_S = 0.01
+    """[s] See `LEFT`. Origin: 653af5ab."""
+    STEADY_S = 0.15
+    """[s] The commanded speed must have been constant for this time, so that a run-up is not
+    mistaken for a sign. Origin: 653af5ab."""
+    WINDOW_S = 0.02
+    """[s] Window of the speed by position. Origin: 653af5ab."""
+    STANDSTILL_SHARE = 0.02
+    """[ratio] Standstill is below the greater of this share of the speed and `STANDSTILL_RPM`.
+    Origin: 653af5ab."""
+    STANDSTILL_RPM = 3.0
+    """[rpm] See `STANDSTILL_SHARE`. Origin: 653af5ab."""
+    SETTLED = 0.002
+    """[ratio] The axis has stopped where no more than this share of the distance, or
+    `RESOLVED_REV`, is left. Origin: 653af5ab."""
+    RESOLVED_REV = 2e-4
+    """[rev] See `SETTLED`. Origin: 653af5ab."""
+    DEVIATIONS = 5.0
+    """[count] Standard deviations of the noise without power that a torque must exceed. Origin:
+    653af5ab."""
+    LEAST_PERCENT = 0.3
+    """[%] Smallest torque, of the rated one, that is distinguished. Origin: 653af5ab."""
+    FILTER = 5
+    """[count] Samples of the median filter of the torque. Origin: 653af5ab."""
+    DISTINCT = 3.0
+    """[ratio] The torque before the trigger must be this many times the noise, or its end is not
+    determined. Origin: 653af5ab."""
+    BEFORE_S = 0.1
+    """[s] Time before the trigger over which that torque is measured. Origin: 653af5ab."""
+    AT_STANDSTILL = 0.1
+    """[ratio] With SS1 the power is removed at standstill: below this share of the speed. Origin:
+    653af5ab."""
+    SPEED_MARGIN = 0.05
+    """[ratio] Share by which the speed limit may be exceeded. Origin: 653af5ab."""
+    SHOWN_BEFORE_S = 0.2
+    """[s] Time before the trigger that the drawing shows. Origin: 653af5ab."""
+    FOLLOWED = 0.95
+    """[ratio] Share of the test speed above which the drive did not react. Origin: 653af5ab."""
+
+
+class safety_check_run:
+    """`safety_check/run.py`."""
+
+    LEAD_S = 0.3
+    """[s] Time without power before the run, for the noise of the torque. Origin: 653af5ab."""
+    RAMP_S = 0.4
+    """[s] Duration of a ramp. Origin: 653af5ab."""
+    END_S = 0.3
+    """[s] Time that is recorded after the end. Origin: 653af5ab."""
+    SIGN_SHARE = 0.9
+    """[ratio] A sign is a speed below this share of the commanded one in `SIGN_ROWS` successive
+    rows. Origin: 653af5ab."""
+    SIGN_ROWS = 10
+    """[count] See `SIGN_SHARE`. Origin: 653af5ab."""
+    USED = 0.85
+    """[ratio] Used share of the travel, which leaves room for the run-down. Origin: 653af5ab."""
+    BELOW_LIMIT = 0.8
+    """[ratio] For the speed limit, the axis first runs at this share of it. Origin: 653af5ab."""

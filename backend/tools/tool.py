@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeAl
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from backend.people.rights import Right
+from backend.foundation.people.rights import Right
+from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.repeats import Repeats
-from backend.work.jobs import Progress
 from drivers.texts.message import Language, Text
 
 if TYPE_CHECKING:  # code that only reads results or settings imports no analysis
@@ -26,9 +26,9 @@ if TYPE_CHECKING:  # code that only reads results or settings imports no analysi
     import numpy as np
     import numpy.typing as npt
 
-    from backend.axis.axis import Axis
-    from backend.axis.cyclic import CyclicSession
-    from backend.motion.envelope import Envelope
+    from backend.axes.axis.axis import Axis
+    from backend.axes.axis.cyclic import CyclicSession
+    from backend.axes.motion.envelope import Envelope
 
 Arrays: TypeAlias = "Mapping[str, npt.NDArray[np.generic]]"
 Meta = Mapping[str, object]
@@ -88,7 +88,7 @@ class ToolSettings(BaseModel):
     @property
     def envelope(self) -> Envelope:
         """The limits of the motion."""
-        from backend.motion.envelope import Envelope
+        from backend.axes.motion.envelope import Envelope
 
         return Envelope(self.travel_limit, self.speed_limit, self.torque_limit, self.time_limit_s)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import JogSettings, jog
-from backend.work.jobs import Progress
 from benchmarks.stopping.rig import Rig
 
 FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "ds_c")

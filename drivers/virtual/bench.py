@@ -72,7 +72,7 @@ class AxisSpec(BaseModel):
     also_station: int | None = None
     serial: int | None = Field(default=None, ge=1, le=0xFFFFFFFF)
     connected: bool = False
-    #: Mechanics driven by the shaft, in the form of `backend.scales.gear_calculator.Mechanics`.
+    #: Mechanics driven by the shaft, in the form of `Mechanics` (backend/axes/scales).
     moves: dict[str, str | int | float] = Field(default_factory=dict)
     #: As in the file; `load_bench` adds the defects.
     mechanics: MechanicsSpec = Field(default_factory=standard_mechanics)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from backend.functions import forcing
+from backend.axes.functions import forcing
 from tests.support.station import Station, until
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from backend.parameters.set_file import storable
+from backend.axes.parameters.set_file import storable
 from drivers.virtual.wires.netns import unavailable
 from profiles.loader import load_profile
 from tests.support.station import Station, until

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from backend.api.handover import routes
 from backend.cli import app
-from backend.handover.read import MAX_BYTES
+from backend.records.handover.read import MAX_BYTES
 from backend.station.demo import DemoBench
 from backend.station.description import import_in_process
 from tests.support.station import Station

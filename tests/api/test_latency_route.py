@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from backend.api.station import adapters as routes
-from backend.preflight.adapters import Adapters
+from backend.foundation.preflight.adapters import Adapters
 from drivers.computer.latency_timer import LatencyTimers
 from tests.support.station import Station
 from tests.unit.preflight.test_latency_list import OnePort

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from pypdf import PdfReader
 
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 from drivers.link import Found
 from profiles.loader import load_profile
 from tests.support import measurements as known

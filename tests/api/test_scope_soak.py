@@ -20,7 +20,7 @@ import pytest
 
 from backend.api.live import connection as live_connection
 from backend.api.live import scope as live_scope
-from backend.recording.reader import RecordingReader
+from backend.records.recording.reader import RecordingReader
 from backend.station.demo import DemoBench
 from drivers.virtual.wires.netns import unavailable
 from tests.api.test_scope_streams import heads

@@ -25,7 +25,7 @@ SETUP: dict[str, Any] = {
 
 
 def snapshot(rows: int = 5, **change: object) -> bytes:
-    """A file, put together by hand after the layout in backend/scope/stored.py."""
+    """A file, put together by hand after the layout in backend/axes/scope/stored.py."""
     header = {
         "created": "2026-11-21T08:00:00Z",
         "notes": "belt loose",

@@ -13,8 +13,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from backend.foundation.work.sleep_watch import LONGEST_S
 from backend.station.demo import DemoBench
-from backend.work.sleep_watch import LONGEST_S
 from tests.api.test_kill import ServerProcess, add_drive, drives
 from tests.api.test_kill_command import MODE, RAMP, Bench, canopen
 from tests.support.station import HANG_S, until

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from backend.api.station.box import routes
-from backend.people.station import People
+from backend.foundation.people.station import People
 from backend.station.box.kept import Box, read
 from drivers.computer.interfaces import Interface
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS

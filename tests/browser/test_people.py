@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Dialog, Locator, Page, expect
 
-from backend.people.rights import Right, Role
-from backend.people.station import People
+from backend.foundation.people.rights import Right, Role
+from backend.foundation.people.station import People
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
 from tests.browser.driving import REPORTED_MS, Bench, open_axis, says_no
 from tests.browser.test_motion import PLUS, _centre

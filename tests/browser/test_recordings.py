@@ -20,7 +20,7 @@ from mcap.reader import make_reader
 from playwright.sync_api import Browser, Page, Playwright, WebSocket, expect
 from rerun.chunk import RrdReader
 
-from backend.recording.reader import RecordingReader
+from backend.records.recording.reader import RecordingReader
 from tests.api.test_scene import messages
 from tests.browser.conftest import FLAGS, PATIENCE_MS
 from tests.browser.driving import Bench

@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from backend.parameters import set_file
+from backend.axes.parameters import set_file
 from tests.docs.pages import DOCS
 from tests.support.station import Station
 

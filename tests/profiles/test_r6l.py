@@ -6,11 +6,11 @@ from collections import Counter
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.foundation.work.jobs import Progress
 from backend.tools.moves.procedures import run_procedure
-from backend.work.jobs import Progress
 from drivers.link import Found
 from profiles import load_profile
 from profiles.check import check

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from tests.support.guarded import Caller, GuardedServer
 
 

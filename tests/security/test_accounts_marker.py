@@ -15,10 +15,10 @@ import httpx
 import pytest
 
 from backend.commands.server.serve import Serving, accounts_needed
-from backend.people.login.marker import FILE, AccountsMarker, AccountsMissing
-from backend.people.rights import Role
-from backend.people.station import People
-from backend.store.database import DatabaseFailed
+from backend.foundation.people.login.marker import FILE, AccountsMarker, AccountsMissing
+from backend.foundation.people.rights import Role
+from backend.foundation.people.station import People
+from backend.foundation.store.database import DatabaseFailed
 from drivers.errors import NotAllowed
 from tests.support.guarded import CHEAP, PASSWORD
 

@@ -19,8 +19,8 @@ import pytest
 from backend.api.audit.audited import CHANGES_NOTHING, REPORTED_THERE, AuditedAnswers
 from backend.api.models import JobInfo
 from backend.api.security.rights import API, ROUTES
-from backend.audit import Fact
-from backend.people.rights import Role
+from backend.foundation.people.rights import Role
+from backend.records.audit import Fact
 from tests.security.conftest import Cast
 from tests.security.test_every_route import address
 from tests.support.guarded import PASSWORD, Caller, GuardedServer

@@ -18,8 +18,8 @@ from backend.api.live import messages as live
 from backend.api.security import socket as security_socket
 from backend.api.security.messages import MESSAGES
 from backend.commands.server.serve import PING_S, PONG_S
-from backend.people.identity import Actor, acting
-from backend.people.rights import RIGHTS, Right, Role
+from backend.foundation.people.identity import Actor, acting
+from backend.foundation.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import Caller, GuardedServer, Page
 from tests.support.machine import OwnTime

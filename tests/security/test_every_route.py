@@ -12,7 +12,7 @@ from fastapi import APIRouter
 from websockets.exceptions import ConnectionClosed
 
 from backend.api.security.rights import API, ROUTES, Need
-from backend.people.rights import RIGHTS, Right, Role
+from backend.foundation.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import PASSWORD, Caller, GuardedServer, Page
 from tests.support.servo import URL

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from backend.api.security.body import has_half_characters
-from backend.recording.bundle import _table
-from backend.store.spreadsheet import as_text
+from backend.foundation.store.spreadsheet import as_text
+from backend.records.recording.bundle import _table
 from tests.security.conftest import Cast
 from tests.support.guarded import Caller, GuardedServer
 

@@ -11,7 +11,7 @@ from schemathesis.checks import CHECKS, load_all_checks
 from schemathesis.core.failures import FailureGroup
 
 from backend.api.security.rights import ROUTES
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from tests.support.guarded import Caller, GuardedServer
 
 load_all_checks()

@@ -19,13 +19,13 @@ from backend.api.admission.requests import (
     MOST_OF_STRANGERS,
     Admission,
 )
-from backend.people.credentials import name_key
-from backend.people.errors import NotLoggedIn, TooOften
-from backend.people.login.budgets import CROWDED, FREE, LoginBudgets, address_group
-from backend.people.login.devices import KnownDevices
-from backend.people.login.turns import MOST_OF_PLACE as MOST_WAITING
-from backend.people.login.turns import MOST_PLACES, HashTurns
-from backend.people.rights import Role
+from backend.foundation.people.credentials import name_key
+from backend.foundation.people.errors import NotLoggedIn, TooOften
+from backend.foundation.people.login.budgets import CROWDED, FREE, LoginBudgets, address_group
+from backend.foundation.people.login.devices import KnownDevices
+from backend.foundation.people.login.turns import MOST_OF_PLACE as MOST_WAITING
+from backend.foundation.people.login.turns import MOST_PLACES, HashTurns
+from backend.foundation.people.rights import Role
 from tests.support.guarded import NAMES, PASSWORD, Caller, GuardedServer
 from tests.support.station import until
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import asyncio
 
-from backend.people.identity import Actor, Identity, acting
-from backend.people.rights import Right, Role
-from backend.work.jobs import Job
+from backend.foundation.people.identity import Actor, Identity, acting
+from backend.foundation.people.rights import Right, Role
+from backend.foundation.work.jobs import Job
 from drivers.cia402 import Mode, State
 from tests.support.guarded import PASSWORD, Caller, GuardedServer, begin_motion
 

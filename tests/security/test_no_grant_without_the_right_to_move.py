@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from backend.api.security.rights import API, ROUTES
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from backend.tools.registry import TOOLS
 from tests.security.test_every_route import ENDS_IT, address
 from tests.support.guarded import Caller, GuardedServer

@@ -16,12 +16,12 @@ from typing import Any
 
 import pytest
 
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters import set_file as parameter_set
 from backend.commands.base import session
 from backend.commands.base.options import Place
 from backend.commands.drive import local_params, remote_params
-from backend.drive.readings import Reading
-from backend.parameters import set_file as parameter_set
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.cia402 import State

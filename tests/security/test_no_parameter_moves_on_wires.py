@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.demo import DemoBench

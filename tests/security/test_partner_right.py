@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from backend.api.tuning import measure
-from backend.people.errors import Forbidden
-from backend.people.rights import Right, Role
+from backend.foundation.people.errors import Forbidden
+from backend.foundation.people.rights import Right, Role
 from drivers.errors import NotAllowed
 from tests.support.guarded import GuardedServer
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.store.database import Store
+from backend.foundation.store.database import Store
 from tests.support.postgres import Postgres, binaries
 
 NO_POSTGRES = "PostgreSQL is not installed (apt-get install postgresql): only SQLite is tested"

@@ -15,17 +15,17 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from backend.audit import AuditLog, Fact
-from backend.audit.trail import Trail
 from backend.cli import app
-from backend.library import Library
-from backend.library.backup.backup import BackupFailed, make_backup
-from backend.library.backup.restore import restore
-from backend.library.catalogue import INLINE
-from backend.library.entries import Addition, AxisIdentity, Query
-from backend.store.blobs import Blobs
-from backend.store.database import Store
-from backend.store.lock import FolderLock
+from backend.foundation.store.blobs import Blobs
+from backend.foundation.store.database import Store
+from backend.foundation.store.lock import FolderLock
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.trail import Trail
+from backend.records.library import Library
+from backend.records.library.backup.backup import BackupFailed, make_backup
+from backend.records.library.backup.restore import restore
+from backend.records.library.catalogue import INLINE
+from backend.records.library.entries import Addition, AxisIdentity, Query
 from drivers.errors import NotAllowed
 from tests.support.postgres import Postgres
 

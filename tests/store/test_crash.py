@@ -20,14 +20,14 @@ from typing import Any
 import pytest
 from sqlalchemy import event, select
 
-from backend.audit import AuditLog, Fact
-from backend.audit.trail import Filter, Trail
-from backend.library.entries import Addition
-from backend.recording.reader import RecordingReader
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.foundation.store.library_tables import Version
+from backend.foundation.work.journal import Journal
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.trail import Filter, Trail
+from backend.records.library.entries import Addition
+from backend.records.recording.reader import RecordingReader
 from backend.station.records import Records
-from backend.store.database import DatabaseFailed, Store
-from backend.store.library_tables import Version
-from backend.work.journal import Journal
 from tests.support.postgres import Postgres
 from tests.support.station import until
 

@@ -13,12 +13,12 @@ from alembic.migration import MigrationContext
 from sqlalchemy import select, text
 from sqlalchemy.exc import DBAPIError
 
-import backend.people.tables
-import backend.store.audit_tables
-import backend.store.library_tables  # noqa: F401 - registers its tables
-from backend.store.base import Base
-from backend.store.database import DatabaseFailed, Store
-from backend.store.library_tables import Item
+import backend.foundation.people.tables
+import backend.foundation.store.audit_tables
+import backend.foundation.store.library_tables  # noqa: F401 - registers its tables
+from backend.foundation.store.base import Base
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.foundation.store.library_tables import Item
 
 
 def test_migrations_and_models_agree(store: Store) -> None:

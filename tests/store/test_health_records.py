@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import update
 
-from backend.health.records import AxisOf, HealthRecords
-from backend.library.backup.copy import copy_rows
-from backend.store.database import Store
-from backend.store.health_tables import HealthBaseline
+from backend.foundation.store.database import Store
+from backend.foundation.store.health_tables import HealthBaseline
+from backend.records.library.backup.copy import copy_rows
 from backend.tools.health.result import HealthRound, HealthValue
 from backend.tools.health.settings import HealthSettings
+from backend.tools.trend.records import AxisOf, HealthRecords
 from benchmarks.health_trend import fill
 from drivers.errors import NotAllowed
 

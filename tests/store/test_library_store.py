@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 
-from backend.audit import Fact
-from backend.library import Library, LibrarySets, NotInLibrary
-from backend.library.catalogue import INLINE
-from backend.library.entries import Addition, AxisIdentity, Query
-from backend.store.blobs import BlobFailed, Blobs
-from backend.store.database import Store
+from backend.foundation.store.blobs import BlobFailed, Blobs
+from backend.foundation.store.database import Store
+from backend.records.audit import Fact
+from backend.records.library import Library, LibrarySets, NotInLibrary
+from backend.records.library.catalogue import INLINE
+from backend.records.library.entries import Addition, AxisIdentity, Query
 from drivers.errors import NotAllowed
 
 X = AxisIdentity("mms7", "X", vendor_id=0x4000_0001, serial=4_000_000_000, firmware="1.2")

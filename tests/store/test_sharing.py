@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend.library import Library
-from backend.library.described import folders
-from backend.library.entries import Addition, Entry, Query
-from backend.library.index import Index
-from backend.library.measurements import MeasurementStore
-from backend.library.sharing import fetch, share
-from backend.store.blobs import BlobFailed, Blobs
-from backend.store.database import Store
+from backend.foundation.store.blobs import BlobFailed, Blobs
+from backend.foundation.store.database import Store
+from backend.records.library import Library
+from backend.records.library.described import folders
+from backend.records.library.entries import Addition, Entry, Query
+from backend.records.library.index import Index
+from backend.records.library.measurements import MeasurementStore
+from backend.records.library.sharing import fetch, share
 from drivers.errors import NotAllowed
 
 NAME = "20261121-101500-sweep-X.sdmeas"

@@ -12,20 +12,20 @@ from sqlalchemy import create_engine
 from typer.testing import CliRunner
 
 import backend
+from backend.axes.restore.identity import DriveIdentity
+from backend.axes.restore.store import RestoreStore
 from backend.cli import app
-from backend.library import Library
-from backend.library.backup.backup import make_backup
-from backend.library.backup.restore import restore
-from backend.library.entries import Addition, Query
-from backend.restore.identity import DriveIdentity
-from backend.restore.store import RestoreStore
+from backend.foundation.store import migrate, state_version
+from backend.foundation.store.blobs import Blobs
+from backend.foundation.store.database import Store
+from backend.foundation.store.state_version import FILE, VERSION, StateRefused
+from backend.foundation.work.journal import Journal
+from backend.records.library import Library
+from backend.records.library.backup.backup import make_backup
+from backend.records.library.backup.restore import restore
+from backend.records.library.entries import Addition, Query
 from backend.station.drive_list import DriveList
 from backend.station.records import Records
-from backend.store import migrate, state_version
-from backend.store.blobs import Blobs
-from backend.store.database import Store
-from backend.store.state_version import FILE, VERSION, StateRefused
-from backend.work.journal import Journal
 from drivers.errors import Busy
 
 #: As 0.1.0 wrote it: a list of drives, a restore list by the server's name of the drive, a record

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from backend.audit import AuditLog, Fact
-from backend.audit.trail import Filter, Trail
-from backend.store.database import Store
+from backend.foundation.store.database import Store
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.trail import Filter, Trail
 
 
 def test_search(store: Store) -> None:

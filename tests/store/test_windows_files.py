@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from backend.library.backup import restore as restoring
-from backend.library.backup.backup import make_backup
-from backend.library.backup.restore import restore
-from backend.restore import store as restore_store
-from backend.store.files import StorageFailed, write_atomically
+from backend.axes.restore import store as restore_store
+from backend.foundation.store.files import StorageFailed, write_atomically
+from backend.records.library.backup import restore as restoring
+from backend.records.library.backup.backup import make_backup
+from backend.records.library.backup.restore import restore
 from profiles.replacing import move_into_place
 from tests.store.test_backup import Station, reopened
 from tests.support.windows_files import keep_rules

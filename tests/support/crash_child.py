@@ -26,13 +26,13 @@ from typing import Any
 
 from sqlalchemy import Engine, event
 
-from backend.audit import Fact
-from backend.library.catalogue import INLINE
-from backend.library.entries import Addition, AxisIdentity
-from backend.recording.writer import RecordingWriter
+from backend.foundation.store.files import write_atomically
+from backend.foundation.work.journal import Journal
+from backend.records.audit import Fact
+from backend.records.library.catalogue import INLINE
+from backend.records.library.entries import Addition, AxisIdentity
+from backend.records.recording.writer import RecordingWriter
 from backend.station.records import Records
-from backend.store.files import write_atomically
-from backend.work.journal import Journal
 from tests.unit.recording.support import block, header
 
 SET = """format = "servodeck parameter set"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.axis.axis import Axis
-from backend.motion.classes import motion_of
+from backend.axes.axis.axis import Axis
+from backend.axes.motion.classes import motion_of
 from drivers.cia402 import Mode
 
 

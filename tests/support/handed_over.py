@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.handover.listed import ControllerList
-from backend.handover.model import is_lock
-from backend.motion.classes import motion_of
-from backend.parameters.set_file import ParameterSet, dump, parse, storable
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.classes import motion_of
+from backend.axes.parameters.set_file import ParameterSet, dump, parse, storable
+from backend.records.handover.listed import ControllerList
+from backend.records.handover.model import is_lock
 from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
 from drivers.link import Found

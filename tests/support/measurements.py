@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from backend.axis.axis import Envelope
-from backend.drive.drive import Drive
-from backend.library.measurements import pack
+from backend.axes.axis.axis import Envelope
+from backend.axes.drive.drive import Drive
+from backend.records.library.measurements import pack
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.measuring import excite

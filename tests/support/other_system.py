@@ -179,7 +179,7 @@ async def ethercat() -> None:
 
 def locks() -> None:
     """Two processes want one folder; the second is refused until the first has let go."""
-    from backend.store.lock import FolderLock
+    from backend.foundation.store.lock import FolderLock
 
     with tempfile.TemporaryDirectory() as folder:
         first = FolderLock(Path(folder))

@@ -21,7 +21,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from backend.api.app import make_app
 from backend.commands.server.serve import LOOPBACK, _listen
-from backend.people.station import People
+from backend.foundation.people.station import People
 from backend.station.bench import Bench
 from backend.station.demo import DemoBench
 

@@ -74,15 +74,15 @@ ALLOWED: dict[tuple[str, str], str] = {
         "reason = request.reason.strip()",
     ): "a person's own words, which must not be empty",
     (
-        "backend/recording/library.py",
+        "backend/records/recording/library.py",
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by words of their descriptions",
     (
-        "backend/audit/trail.py",
+        "backend/records/audit/trail.py",
         "for word in self.words.split():",
     ): "a person searches the audit by words",
     (
-        "backend/library/rows.py",
+        "backend/records/library/rows.py",
         "for word in query.words.lower().split():",
     ): "a person searches the library by words",
     (

@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.tools.jog.cyclic import GeneratorSettings, generate
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec

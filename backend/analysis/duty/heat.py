@@ -18,26 +18,11 @@ import numpy.typing as npt
 import scipy
 
 from backend.analysis.duty.load import Signals
+from backend.analysis.thresholds import duty_heat as threshold
 
 FloatArray = npt.NDArray[np.float64]
 #: Ambient temperature for which the rated torque holds (IEC 60034-1), °C.
 RATED_AMBIENT_C = 40.0
-#: Share of the rated temperature rise between winding and housing.
-_WINDING = (0.15, 0.3, 0.5)
-#: Time constant of the winding against the housing, in s, and as a share of the motor's.
-_WINDING_S, _WINDING_SHARE = (10.0, 60.0), (0.02, 0.1)
-#: Share of the rated losses that depends on the speed alone, and the exponent of the speed. Where
-#: the torque at standstill is stated, the share is known to within the relative error ``_STATED``.
-_SPEED_SHARE, _SPEED_POWER, _STATED = (0.0, 0.35), (1.0, 2.0), 0.15
-#: Current in excess of torque at three times rated torque, per unit of torque above the rated one.
-_SATURATION = (0.0, 0.07)
-#: Copper has 0.39 %/K at 20 °C: relative to the hot resistance, per rated rise of 60 to 125 K.
-_COPPER = (0.0, 0.35)
-#: Range of the time constant: the catalogue's value holds for a motor on some flange.
-_TIME_CONSTANT = (0.75, 1.3)
-#: Longest time searched for the trip, in time constants.
-_LONGEST = 12.0
-_MOMENTS = 400
 
 
 @dataclass(frozen=True)
@@ -90,34 +75,36 @@ def heat_of(
     even = signals.evenly(20_000)
     rises: list[float] = []
     trips: list[float | None] = []
-    shares = _SPEED_SHARE
+    shares = threshold.SPEED_SHARE
     if standstill is not None:
         share = 1.0 - 1.0 / max(standstill, 1.0) ** 2
-        shares = ((1.0 - _STATED) * share, (1.0 + _STATED) * share)
-    for losses in _losses(even, rated_rpm, shares, tuple(zip(_SATURATION, scale, strict=True))):
-        for winding, tau_w in itertools.product(_WINDING, _winding_taus(time_constant_s)):
+        shares = ((1.0 - threshold.STATED) * share, (1.0 + threshold.STATED) * share)
+    for losses in _losses(
+        even, rated_rpm, shares, tuple(zip(threshold.SATURATION, scale, strict=True))
+    ):
+        for winding, tau_w in itertools.product(threshold.WINDING, _winding_taus(time_constant_s)):
             thermal = _Bodies(losses, winding, tau_w, even.spacing_s)
             rises.append(thermal.highest() / permitted)
             if time_constant_s is None:
                 continue
-            for factor, copper in itertools.product(_TIME_CONSTANT, _COPPER):
+            for factor, copper in itertools.product(threshold.TIME_CONSTANT, threshold.COPPER):
                 trips.append(thermal.too_warm_s(permitted, factor * time_constant_s, copper))
     known = [each for each in trips if each is not None]
     latest = None if not known or len(known) < len(trips) else max(known)
     about = None
     if time_constant_s is not None:
-        middle = (0.5 * sum(shares), 0.5 * sum(_SATURATION))
+        middle = (0.5 * sum(shares), 0.5 * sum(threshold.SATURATION))
         losses = _one(even, rated_rpm, middle[0], 1.5, middle[1])
-        tau_w = float(np.sqrt(np.prod(_WINDING_SHARE))) * time_constant_s
-        motor = _Bodies(losses, _WINDING[1], tau_w, even.spacing_s)
-        about = motor.too_warm_s(permitted, time_constant_s, 0.5 * sum(_COPPER))
+        tau_w = float(np.sqrt(np.prod(threshold.WINDING_SHARE))) * time_constant_s
+        motor = _Bodies(losses, threshold.WINDING[1], tau_w, even.spacing_s)
+        about = motor.too_warm_s(permitted, time_constant_s, 0.5 * sum(threshold.COPPER))
     return Heat((min(rises), max(rises)), (min(known, default=None), latest), about)
 
 
 def _winding_taus(time_constant_s: float | None) -> tuple[float, ...]:
     if time_constant_s is None:
-        return _WINDING_S
-    return tuple(share * time_constant_s for share in _WINDING_SHARE)
+        return threshold.WINDING_S
+    return tuple(share * time_constant_s for share in threshold.WINDING_SHARE)
 
 
 def _losses(
@@ -127,7 +114,7 @@ def _losses(
     currents: Iterable[tuple[float, float]],
 ) -> Iterator[_Losses]:
     for (saturation, factor), share, power in itertools.product(
-        currents, shares, _SPEED_POWER if rated_rpm is not None else (0.0, np.inf)
+        currents, shares, threshold.SPEED_POWER if rated_rpm is not None else (0.0, np.inf)
     ):
         yield _one(even, rated_rpm, share, power, saturation, factor)
 
@@ -192,7 +179,7 @@ class _Bodies:
         given = np.array([self._copper * (1.0 - copper * permitted) / c_w, self._elsewhere / c_h])
         values, vectors = np.linalg.eig(matrix)
         still = np.linalg.solve(vectors, given)
-        moments = np.geomspace(1e-3 * self._tau_w, _LONGEST * tau_s, _MOMENTS)
+        moments = np.geomspace(1e-3 * self._tau_w, threshold.LONGEST * tau_s, threshold.MOMENTS)
         # ∫ e^{λt} dt of each eigenvector; λ is never exactly zero with losses of finite precision.
         grown = np.expm1(np.clip(np.outer(moments, values.real), None, 50.0)) / values.real
         winding = grown @ (vectors[0].real * still.real)

@@ -12,16 +12,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from backend.analysis.thresholds import duty_load as threshold
+
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 _RAD_S = 2.0 * np.pi / 60.0
-#: An interval is a gap if it is longer than this many usual ones, and than this time, s.
-_GAP_FACTOR, _GAP_S = 5.0, 0.25
-#: A period counts if the correlation of the signals one period apart is at least ``_REPEATS``; a
-#: period is preferred to its multiple if its correlation is at least ``_NEARLY`` of the best one.
-#: The correlation must have fallen below ``_FALLEN`` before.
-_REPEATS, _NEARLY, _FALLEN = 0.8, 0.97, 0.5
-_MOST_SAMPLES = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -45,14 +40,16 @@ class Signals:
     @property
     def known(self) -> BoolArray:
         """False for each interval between two samples [n − 1] that is a gap."""
-        return np.asarray(np.diff(self.time_s) <= max(_GAP_FACTOR * self.spacing_s, _GAP_S))
+        return np.asarray(
+            np.diff(self.time_s) <= max(threshold.GAP_FACTOR * self.spacing_s, threshold.GAP_S)
+        )
 
     @property
     def longest_gap_s(self) -> float:
         """Longest time between two samples, s."""
         return float(np.max(np.diff(self.time_s)))
 
-    def evenly(self, most: int = _MOST_SAMPLES) -> Signals:
+    def evenly(self, most: int = threshold.MOST_SAMPLES) -> Signals:
         """Return the signals on a grid of even spacing."""
         spacing = max(self.spacing_s, self.duration_s / most)
         time = np.arange(self.time_s[0], self.time_s[-1], spacing)
@@ -116,7 +113,7 @@ def period_of(signals: Signals) -> float | None:
         return None
     correlation = total / np.maximum(energy, 1e-12)
     half = correlation[: size // 2 + 1]
-    fallen = np.flatnonzero(half < _FALLEN)
+    fallen = np.flatnonzero(half < threshold.FALLEN)
     if not fallen.size:
         return None
     begin = int(fallen[0])
@@ -127,10 +124,10 @@ def period_of(signals: Signals) -> float | None:
             (half[begin + 1 : -1] >= half[begin:-2]) & (half[begin + 1 : -1] >= half[begin + 2 :])
         )
     )
-    if not peaks.size or float(np.max(half[peaks])) < _REPEATS:
+    if not peaks.size or float(np.max(half[peaks])) < threshold.REPEATS:
         return None
     best = float(np.max(half[peaks]))
-    lag = int(peaks[np.flatnonzero(half[peaks] >= _NEARLY * best)[0]])
+    lag = int(peaks[np.flatnonzero(half[peaks] >= threshold.NEARLY * best)[0]])
     return _refined(half, lag) * spacing
 
 

@@ -11,9 +11,9 @@ from collections import Counter, OrderedDict, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from backend.people.errors import TooOften
-from backend.people.login.budgets import address_group
-from backend.people.throttle import Bucket
+from backend.foundation.people.errors import TooOften
+from backend.foundation.people.login.budgets import address_group
+from backend.foundation.people.throttle import Bucket
 
 #: Requests in progress at once: all but STOP, those of unknown clients, and
 #: of these from one address.

@@ -2,7 +2,7 @@
 
 Changes of drive parameters, control, people and the library are recorded where they happen, with
 values. Every other change is recorded here, so that no new route can omit it: the requested values,
-and the earlier ones where the route provides them (`backend.audit.asked.note_before`).
+and the earlier ones where the route provides them (`backend.records.audit.asked.note_before`).
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from urllib.parse import parse_qsl
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from backend.api.security.rights import API, Matched, Policy
-from backend.audit import AuditLog, Fact
-from backend.audit.asked import MOST_BYTES, Asked, asked, fields_of
-from backend.audit.facts import Action, Kind
-from backend.people.rights import Right
+from backend.foundation.people.rights import Right
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.asked import MOST_BYTES, Asked, asked, fields_of
+from backend.records.audit.facts import Action, Kind
 from backend.tools.registry import TOOLS
 
 #: Longest time [s] that an answer waits for the audit. The change itself never waits.

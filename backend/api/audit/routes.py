@@ -20,9 +20,9 @@ from backend.api.audit.models import (
 from backend.api.context import TheBench
 from backend.api.errors import message_or_none, words_of
 from backend.api.times import in_utc
-from backend.audit.chain import Anchor
-from backend.audit.facts import KINDS
-from backend.audit.trail import Event, Filter
+from backend.records.audit.chain import Anchor
+from backend.records.audit.facts import KINDS
+from backend.records.audit.trail import Event, Filter
 from drivers.errors import OutOfRange
 from drivers.texts.message import language
 

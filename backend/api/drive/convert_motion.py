@@ -9,9 +9,9 @@ from backend.api.drive.models_motion import (
     SequenceRequest,
 )
 from backend.api.live.messages import JogStart
-from backend.axis.axis import Envelope
-from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
-from backend.scales.travel_units import travel_unit
+from backend.axes.axis.axis import Envelope
+from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
+from backend.axes.scales.travel_units import travel_unit
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import GeneratorSettings

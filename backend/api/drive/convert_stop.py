@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from backend.api.drive import models_axis
 from backend.api.errors import message_of, message_or_none, words_of
-from backend.axis.stop.facts import AxisStop, Verdict
+from backend.axes.axis.stop.facts import AxisStop, Verdict
+from backend.axes.stopping.stop_message import stop_message
+from backend.axes.stopping.turning import Turning
 from backend.station.bench import Bench
-from backend.stopping.stop_message import stop_message
-from backend.stopping.turning import Turning
 from drivers.texts.message import text
 
 

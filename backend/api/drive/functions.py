@@ -25,16 +25,16 @@ from backend.api.drive.models_functions import (
 from backend.api.drive.models_parameters import ParameterValue
 from backend.api.errors import NotFound, message_of, message_or_none, words_of
 from backend.api.models import JobInfo
-from backend.audit.asked import note_before
-from backend.axis.axis import Envelope
-from backend.axis.fault_history import PastFault, history_of, read_history
-from backend.axis.remembered import AxisRecord, AxisStore
-from backend.drive.catalog import functions_of
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.functions import gear, regeneration
-from backend.scales.gear_calculator import GearPlan, Mechanics
-from backend.scales.units import gentlest_ramp_rpm_s
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.fault_history import PastFault, history_of, read_history
+from backend.axes.axis.remembered import AxisRecord, AxisStore
+from backend.axes.drive.catalog import functions_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.functions import gear, regeneration
+from backend.axes.scales.gear_calculator import GearPlan, Mechanics
+from backend.axes.scales.units import gentlest_ramp_rpm_s
+from backend.records.audit.asked import note_before
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.moves import identification
 from drivers.errors import DriveError

@@ -9,8 +9,8 @@ from pydantic import Field
 
 from backend.api.drive.models_parameters import ParameterValue
 from backend.api.models import Message, Positive
-from backend.functions.regeneration import Verdict
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.functions.regeneration import Verdict
+from backend.axes.scales.gear_calculator import Mechanics
 from backend.tools.wire_message import MessageInfo
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
-from backend.scales.scale import Origin, Quantity, Uncertainty
+from backend.axes.scales.scale import Origin, Quantity, Uncertainty
 
 
 class ScaleInfo(Message):

@@ -12,8 +12,8 @@ from backend.api.errors import NotFound, message_or_none, words_of
 from backend.api.named_profile import profile_named
 from backend.api.security.gate import require_right
 from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
-from backend.audit.asked import note_before
-from backend.people.rights import Right
+from backend.foundation.people.rights import Right
+from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import profile_text, text

@@ -9,8 +9,8 @@ from backend.api.context import Controlled, Me, TheBench, ThePeople
 from backend.api.models import JobInfo
 from backend.api.security.gate import require_right
 from backend.api.station.models import DriveSummary
-from backend.motion.classes import motion_of
-from backend.people.rights import Right
+from backend.axes.motion.classes import motion_of
+from backend.foundation.people.rights import Right
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 

@@ -36,16 +36,16 @@ from backend.api.drive.models_parameters import (
 from backend.api.errors import NotFound, problem_of
 from backend.api.models import JobInfo
 from backend.api.sets.models import LoadSetRequest
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.functions.assign import assign
-from backend.motion.classes import held_still, motion_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.functions.assign import assign
+from backend.axes.motion.classes import held_still, motion_of
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools import parameters
 from backend.tools.jog import cyclic as cyclic_motion
 from backend.tools.moves import homing, move, procedures
-from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import Text, profile_text, text

@@ -16,18 +16,18 @@ from backend.api.drive.models_scales import (
 )
 from backend.api.errors import words_of
 from backend.api.models import JobInfo
-from backend.audit.asked import note_before
-from backend.axis import teaching
-from backend.axis.restoring import shielded
-from backend.drive.identity import read_serial
-from backend.scales.scale import Origin, Quantity, Scale, what_to_do
-from backend.scales.taught import Taught
-from backend.scales.units import AxisUnits
+from backend.axes.axis import teaching
+from backend.axes.axis.restoring import shielded
+from backend.axes.drive.identity import read_serial
+from backend.axes.scales.scale import Origin, Quantity, Scale, what_to_do
+from backend.axes.scales.taught import Taught
+from backend.axes.scales.units import AxisUnits
+from backend.foundation.work.jobs import JobResult, Progress
+from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
-from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError
 from drivers.texts.message import Text, joined, text
 

@@ -20,10 +20,10 @@ from backend.api.drive.models_functions import (
 )
 from backend.api.drive.models_parameters import ParameterValue
 from backend.api.errors import NotFound
-from backend.drive import terminals as io_functions
-from backend.drive.catalog import functions_of
-from backend.drive.terminals import ProbeSettings, TerminalState
-from backend.functions.forcing import ForcingSession, ForcingSessions
+from backend.axes.drive import terminals as io_functions
+from backend.axes.drive.catalog import functions_of
+from backend.axes.drive.terminals import ProbeSettings, TerminalState
+from backend.axes.functions.forcing import ForcingSession, ForcingSessions
 from backend.station.connected_drive import ConnectedDrive
 from drivers.texts.message import Text, joined, text
 from profiles.functions import Forcing, TerminalFacts

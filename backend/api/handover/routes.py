@@ -27,10 +27,14 @@ from backend.api.handover.models import (
     SegmentAxis,
     SegmentHandoverRequest,
 )
-from backend.drive.drive import Drive
-from backend.handover.conflicts import Conflict, changed_since, compare
-from backend.handover.esi import reported_controllers
-from backend.handover.files import (
+from backend.axes.drive.drive import Drive
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import BadSet, ParameterSet
+from backend.foundation.people.identity import acting_person
+from backend.foundation.work.apart import read_apart
+from backend.records.handover.conflicts import Conflict, changed_since, compare
+from backend.records.handover.esi import reported_controllers
+from backend.records.handover.files import (
     digest,
     files_of,
     fitting,
@@ -38,15 +42,11 @@ from backend.handover.files import (
     wanted_of,
     with_controllers,
 )
-from backend.handover.model import AxisHandover, hand_over
-from backend.handover.read import MAX_BYTES, read_list
-from backend.handover.record import HandedOver, HandoverLog
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import BadSet, ParameterSet
-from backend.people.identity import acting_person
+from backend.records.handover.model import AxisHandover, hand_over
+from backend.records.handover.read import MAX_BYTES, read_list
+from backend.records.handover.record import HandedOver, HandoverLog
 from backend.station.bench import Bench
 from backend.station.description import import_in_process
-from backend.work.apart import read_apart
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
 from profiles.importer.esi_controller import ControllersTask

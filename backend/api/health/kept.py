@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 
-from backend.drive.drive import Drive
-from backend.health.records import HealthRecords, axis_of
-from backend.people.identity import acting_person
+from backend.axes.drive.drive import Drive
+from backend.foundation.people.identity import acting_person
 from backend.station.bench import Bench
 from backend.tools.health.result import HealthResult
 from backend.tools.health.settings import HealthSettings
+from backend.tools.trend.records import HealthRecords, axis_of
 
 
 def records_of(bench: Bench) -> HealthRecords:

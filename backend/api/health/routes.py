@@ -25,11 +25,11 @@ from backend.api.health.models import (
 )
 from backend.api.health.unattended import Unattended
 from backend.api.models import JobInfo
-from backend.health.compare import Finding
-from backend.health.permission import Attempt, Permission, next_due
-from backend.health.records import Baseline, Condition, HealthRow, axis_of
-from backend.health.words import message_of
 from backend.tools.health.result import UNITS
+from backend.tools.trend.compare import Finding
+from backend.tools.trend.permission import Attempt, Permission, next_due
+from backend.tools.trend.records import Baseline, Condition, HealthRow, axis_of
+from backend.tools.trend.words import message_of
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 

@@ -1,7 +1,8 @@
 """Unattended health checks: on a schedule, or triggered by a controller.
 
-Each needs the standing permission of a person who may move the axis (`backend.health.permission`),
-and the axis free and at standstill. Otherwise nothing moves, and the obstacle is recorded.
+Each needs the standing permission of a person who may move the axis
+(`backend.tools.trend.permission`), and the axis free and at standstill. Otherwise nothing moves,
+and the obstacle is recorded.
 """
 
 from __future__ import annotations
@@ -14,8 +15,18 @@ from datetime import UTC, datetime, timedelta
 
 from backend.api.health.kept import records_of
 from backend.api.tuning.measure import start_tool
-from backend.health.compare import CHECKS
-from backend.health.permission import (
+from backend.axes.stopping.speed import SpeedWatch, units_of
+from backend.foundation.people.identity import Actor, Identity, acting, arrived_s, by_itself
+from backend.foundation.people.rights import MOVING, RIGHTS, Role
+from backend.foundation.people.station import People
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.work.jobs import Job
+from backend.station.bench import Bench
+from backend.station.connected_drive import ConnectedDrive
+from backend.tools.health.settings import HealthSettings
+from backend.tools.registry import BY_KIND
+from backend.tools.thresholds import trend_compare
+from backend.tools.trend.permission import (
     WINDOW,
     Attempt,
     Cause,
@@ -26,18 +37,8 @@ from backend.health.permission import (
     require_term,
     why_of,
 )
-from backend.health.records import Baseline, axis_of
-from backend.health.words import message_of
-from backend.people.identity import Actor, Identity, acting, arrived_s, by_itself
-from backend.people.rights import MOVING, RIGHTS, Role
-from backend.people.station import People
-from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
-from backend.stopping.speed import SpeedWatch, units_of
-from backend.store.files import StorageFailed
-from backend.tools.health.settings import HealthSettings
-from backend.tools.registry import BY_KIND
-from backend.work.jobs import Job
+from backend.tools.trend.records import Baseline, axis_of
+from backend.tools.trend.words import message_of
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed
 from drivers.texts.message import Text, text
@@ -210,7 +211,7 @@ class Unattended:
         try:
             connected, baseline = await self._require(permission)
             settings = HealthSettings.model_validate(
-                {**baseline.settings, "rounds": CHECKS, "consent": False}
+                {**baseline.settings, "rounds": trend_compare.CHECKS, "consent": False}
             )
             info = await start_tool(self._bench, connected, BY_KIND["health"], settings)
         finally:

@@ -12,8 +12,8 @@ from backend.api.library.models import (
     ThreeWayRow,
     VersionInfo,
 )
-from backend.library.entries import AxisIdentity, Entry, Version
-from backend.library.three_way import Triple
+from backend.records.library.entries import AxisIdentity, Entry, Version
+from backend.records.library.three_way import Triple
 from drivers.texts.answers import message_in
 from drivers.texts.message import Text
 from profiles.schema import Parameter, Raw

@@ -23,9 +23,9 @@ from backend.api.library.models import (
 )
 from backend.api.scope.recordings import TheRecordings
 from backend.api.times import in_utc
-from backend.library import NotInLibrary, sharing
-from backend.library.entries import Entry
-from backend.library.entries import Query as LibraryQuery
+from backend.records.library import NotInLibrary, sharing
+from backend.records.library.entries import Entry
+from backend.records.library.entries import Query as LibraryQuery
 from backend.station.bench import Bench
 from backend.station.recording.service import Recordings
 from drivers.errors import NotAllowed

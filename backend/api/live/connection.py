@@ -47,9 +47,9 @@ from backend.api.live.people_messages import PeopleRequest
 from backend.api.live.scope import ScopeStreams
 from backend.api.live.shared import Shared, only
 from backend.api.security.messages import require_message
-from backend.audit.asked import Asked, asked
-from backend.people.identity import Actor, Identity, acting, arrived_s
-from backend.people.station import People
+from backend.foundation.people.identity import Actor, Identity, acting, arrived_s
+from backend.foundation.people.station import People
+from backend.records.audit.asked import Asked, asked
 from backend.station.bench import Bench
 from backend.tools.jog.release import end_of_jog
 from drivers.errors import DriveError

@@ -13,12 +13,12 @@ from backend.api.live.people_messages import (
     LeaseOverride,
 )
 from backend.api.people.record import PeopleRecord
-from backend.audit.facts import Action
-from backend.people.errors import Forbidden
-from backend.people.identity import Identity
-from backend.people.lease import Notice
-from backend.people.rights import GRANTABLE, Right
-from backend.people.station import People
+from backend.foundation.people.errors import Forbidden
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.lease import Notice
+from backend.foundation.people.rights import GRANTABLE, Right
+from backend.foundation.people.station import People
+from backend.records.audit.facts import Action
 from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text

@@ -14,13 +14,13 @@ from backend.api.live.messages import Logged
 from backend.api.live.people import PeopleLive
 from backend.api.live.shared import Shared
 from backend.api.security.socket import OpenSockets
-from backend.drive.readings import Reading
-from backend.people.identity import Actor, acting
-from backend.people.station import People
+from backend.axes.drive.readings import Reading
+from backend.foundation.people.identity import Actor, acting
+from backend.foundation.people.station import People
+from backend.foundation.work.jobs import Job
+from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
-from backend.work.jobs import Job
-from backend.work.journal import Entry
 from drivers.texts.message import text
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from backend.api import convert
 from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ToPage, ValuesChanged
+from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
-from backend.work.jobs import Job
 
 
 def state(bench: Bench, drive: str, snapshot: Snapshot) -> ToPage | None:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from backend.api.live.messages import ToPage
 from backend.api.live.shared import Shared
-from backend.people.identity import Identity
+from backend.foundation.people.identity import Identity
 from drivers.texts.message import Text
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from backend.api.models import Message
-from backend.people.rights import Right, Role
+from backend.foundation.people.rights import Right, Role
 from backend.tools.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo
 

@@ -7,10 +7,10 @@ from collections.abc import Coroutine, Mapping
 
 from backend.api.live.page import Page
 from backend.api.people.record import PeopleRecord
-from backend.people.station import People
-from backend.people.support import Invitation
+from backend.foundation.people.station import People
+from backend.foundation.people.support import Invitation
+from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
-from backend.work.jobs import Job
 from drivers.cia402 import State
 from drivers.texts.message import Text, text
 

@@ -14,11 +14,11 @@ from backend.api.live.people_messages import (
     PeopleHere,
     PersonHere,
 )
-from backend.people.elapsed import moment_of
-from backend.people.identity import Identity
-from backend.people.rights import Right
-from backend.people.station import People
-from backend.people.support import Invitation, Said
+from backend.foundation.people.elapsed import moment_of
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
+from backend.foundation.people.support import Invitation, Said
 from backend.station.bench import Bench
 
 

@@ -17,9 +17,9 @@ from fastapi import WebSocketDisconnect
 from backend.api.errors import problem_of
 from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop, ToPage
 from backend.api.live.scope_blocks import encode_block
-from backend.scales.units import AxisUnits
-from backend.scope.hub import Subscription
-from backend.scope.units import axis_scale
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scope.hub import Subscription
+from backend.axes.scope.units import axis_scale
 from backend.station.bench import Bench
 from drivers.errors import Busy, DriveError
 

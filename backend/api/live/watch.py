@@ -9,9 +9,9 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from backend.people.station import People
+from backend.foundation.people.station import People
+from backend.foundation.work.sleep_watch import PERIOD_S, SleepWatch
 from backend.station.bench import Bench
-from backend.work.sleep_watch import PERIOD_S, SleepWatch
 from drivers.errors import DriveError
 
 if TYPE_CHECKING:

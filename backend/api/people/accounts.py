@@ -17,11 +17,11 @@ from backend.api.people.models import (
 )
 from backend.api.people.record import TheRecord
 from backend.api.security.own_session import own_account, whose_sessions
-from backend.people.accounts import Accounts
-from backend.people.errors import NoSuchPerson
-from backend.people.identity import Identity
-from backend.people.records import Account, Token
-from backend.people.rights import rights_text, role_text
+from backend.foundation.people.accounts import Accounts
+from backend.foundation.people.errors import NoSuchPerson
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.records import Account, Token
+from backend.foundation.people.rights import rights_text, role_text
 from drivers.texts.message import text
 
 router = APIRouter()

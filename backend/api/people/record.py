@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from fastapi import Depends
 
 from backend.api.context import TheBench
-from backend.audit.facts import Action, Fact
+from backend.foundation.work.journal import Level
+from backend.records.audit.facts import Action, Fact
 from backend.station.bench import Bench
-from backend.work.journal import Level
 from drivers.texts.message import Text
 
 

@@ -21,8 +21,8 @@ from backend.api.security.own_session import (
     whose_sessions,
     with_cookie,
 )
-from backend.people.errors import NoSuchPerson, NotLoggedIn
-from backend.people.tls import authority_file
+from backend.foundation.people.errors import NoSuchPerson, NotLoggedIn
+from backend.foundation.people.tls import authority_file
 from drivers.texts.message import text
 
 router = APIRouter()

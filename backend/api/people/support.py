@@ -22,8 +22,8 @@ from backend.api.people.models import (
 from backend.api.people.record import TheRecord
 from backend.api.security.gate import require_right
 from backend.api.security.own_session import address_of, with_cookie
-from backend.people.errors import Forbidden, NotLoggedIn
-from backend.people.rights import Right, rights_text
+from backend.foundation.people.errors import Forbidden, NotLoggedIn
+from backend.foundation.people.rights import Right, rights_text
 from drivers.texts.message import text
 
 router = APIRouter()

@@ -16,8 +16,8 @@ from backend.api.handover.routes import handover_log
 from backend.api.health.kept import records_of
 from backend.api.report.models import ReportInfo, ReportRequest
 from backend.api.tuning.measurements import change_log, measurement_head
-from backend.health.records import axis_of
-from backend.library.measurements import BadMeasurement, Head
+from backend.foundation.store.database import DatabaseFailed
+from backend.records.library.measurements import BadMeasurement, Head
 from backend.report.gather import (
     About,
     belongs,
@@ -30,7 +30,7 @@ from backend.report.gather import (
 from backend.report.store import Format, ReportStore, render
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
-from backend.store.database import DatabaseFailed
+from backend.tools.trend.records import axis_of
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 

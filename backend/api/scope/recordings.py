@@ -32,16 +32,16 @@ from backend.api.scope.recording_models import (
     RetentionBounds,
     StartRecording,
 )
-from backend.audit.asked import note_before
-from backend.people.identity import acting_person
-from backend.recording.chunks import Samples
-from backend.recording.library import Retention, Stored
-from backend.recording.reader import Channel, RecordingReader
+from backend.foundation.people.identity import acting_person
+from backend.foundation.store.free_space import RESERVE_BYTES
+from backend.records.audit.asked import note_before
+from backend.records.recording.chunks import Samples
+from backend.records.recording.library import Retention, Stored
+from backend.records.recording.reader import Channel, RecordingReader
 from backend.station.recording.capture import AFTER_S, BEFORE_S, FaultCapture
 from backend.station.recording.recorder import Recorder, Settings, Trigger
 from backend.station.recording.service import Recordings
 from backend.station.recording.streams import describe_streams
-from backend.store.free_space import RESERVE_BYTES
 from drivers.errors import NotAllowed
 
 router = APIRouter()

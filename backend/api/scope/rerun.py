@@ -10,11 +10,11 @@ from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 
 from backend.api.errors import NotFound
-from backend.recording.rerun_assets import FILES, ViewerAssets
+from backend.records.recording.rerun_assets import FILES, ViewerAssets
 from backend.station.recording.rerun_feed import RerunFeed
 from drivers.errors import NotAllowed
 
-_FOLDER = Path(__file__).resolve().parents[2] / "recording" / "viewer"
+_FOLDER = Path(__file__).resolve().parents[2] / "records" / "recording" / "viewer"
 #: The viewer is WebAssembly; the browser may compile it on this page only.
 _POLICY = (
     "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; "

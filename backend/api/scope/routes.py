@@ -12,7 +12,7 @@ from backend.api import convert
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
 from backend.api.scope.models import NamedSetup, ScopeSetup, SnapshotHeader, SnapshotInfo
-from backend.scope.stored import (
+from backend.axes.scope.stored import (
     MAX_SNAPSHOT_BYTES,
     BadSnapshot,
     ScopeStore,

@@ -32,19 +32,19 @@ from backend.api.security.body import BodyRefused, MeasuredBody, framing, is_jso
 from backend.api.security.origin import Addresses, header
 from backend.api.security.rights import Matched, Policy
 from backend.api.security.socket import GuardedSocket, OpenSockets
-from backend.people.credentials import csrf_of, same_text
-from backend.people.errors import Forbidden, NotLoggedIn, TooOften
-from backend.people.identity import Actor, Identity, acting, arrived_s
-from backend.people.lease import Leases
-from backend.people.rights import Right
-from backend.people.station import People
+from backend.foundation.people.credentials import csrf_of, same_text
+from backend.foundation.people.errors import Forbidden, NotLoggedIn, TooOften
+from backend.foundation.people.identity import Actor, Identity, acting, arrived_s
+from backend.foundation.people.lease import Leases
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import text
 
 log = logging.getLogger(__name__)
 
 COOKIE, SECURE_COOKIE = "servodeck", "__Host-servodeck"
-#: Cookie of a browser that has logged in before; see `backend.people.login.devices`.
+#: Cookie of a browser that has logged in before; see `backend.foundation.people.login.devices`.
 DEVICE_COOKIE, SECURE_DEVICE_COOKIE = "servodeck-device", "__Host-servodeck-device"
 CSRF_HEADER = "x-servodeck-csrf"
 CONNECTION_HEADER = "x-servodeck-connection"

@@ -9,10 +9,10 @@ from backend.api.live import people_messages as people_live
 from backend.api.live.control import require_control
 from backend.api.models import Message
 from backend.api.security.gate import require_right
-from backend.people.errors import Forbidden
-from backend.people.identity import Identity
-from backend.people.rights import Right
-from backend.people.station import People
+from backend.foundation.people.errors import Forbidden
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
 
 #: ``always``: everybody with a connection, including viewers and just after the session has ended.
 #: ``control``: everybody who may control this axis now.

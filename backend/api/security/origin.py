@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from backend.people.errors import Forbidden
+from backend.foundation.people.errors import Forbidden
 
 Headers = list[tuple[bytes, bytes]]
 _HOST = re.compile(r"(?P<name>\[[^\[\]@]*\]|[^:\[\]@]*)(:\d{1,5})?")

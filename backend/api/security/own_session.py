@@ -12,14 +12,14 @@ from backend.api.security.gate import (
     SECURE_DEVICE_COOKIE,
     credentials,
 )
-from backend.people.accounts import Accounts
-from backend.people.credentials import csrf_of
-from backend.people.errors import Forbidden
-from backend.people.identity import Identity
-from backend.people.login.devices import LIFETIME_S
-from backend.people.records import Account
-from backend.people.rights import Right
-from backend.people.station import People
+from backend.foundation.people.accounts import Accounts
+from backend.foundation.people.credentials import csrf_of
+from backend.foundation.people.errors import Forbidden
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.devices import LIFETIME_S
+from backend.foundation.people.records import Account
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
 
 
 def session_of(people: People, identity: Identity | None, cookie: str | None) -> Session:

@@ -14,7 +14,7 @@ from typing import Literal
 
 from starlette.routing import compile_path
 
-from backend.people.rights import Right
+from backend.foundation.people.rights import Right
 from backend.tools.registry import TOOLS
 
 API = "/api/v1"

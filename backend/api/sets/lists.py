@@ -12,9 +12,9 @@ from backend.api.context import TheBench
 from backend.api.errors import NotFound, message_of
 from backend.api.named_profile import profile_named
 from backend.api.station.models_description import ImportedList
-from backend.parameters.lists import export_list, import_list
-from backend.parameters.set_file import MAX_BYTES, BadSet
-from backend.work.apart import read_apart
+from backend.axes.parameters.lists import export_list, import_list
+from backend.axes.parameters.set_file import MAX_BYTES, BadSet
+from backend.foundation.work.apart import read_apart
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
 

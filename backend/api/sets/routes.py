@@ -14,16 +14,16 @@ from backend.api.errors import NotFound, message_of, words_of
 from backend.api.library import convert as convert_library
 from backend.api.library.models import StoredSet, ThreeWay
 from backend.api.sets.models import Diff, SaveSetRequest
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.library.identity import differences
-from backend.library.three_way import three_way as compare_three
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import MAX_BYTES, BadSet, ParameterSet, Row
-from backend.people.identity import acting_person
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import MAX_BYTES, BadSet, ParameterSet, Row
+from backend.foundation.people.identity import acting_person
+from backend.foundation.work.apart import SMALL_BYTES, read_apart
+from backend.records.library.identity import differences
+from backend.records.library.three_way import three_way as compare_three
 from backend.station.bench import Bench
 from backend.tools import parameters
-from backend.work.apart import SMALL_BYTES, read_apart
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 

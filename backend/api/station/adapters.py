@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 
 from backend.api.context import TheBench
 from backend.api.station.models_preflight import LatencyRequest, LatencyTimerInfo
-from backend.preflight.adapters import LOWERED_MS, Adapters, most_reads
+from backend.foundation.preflight.adapters import LOWERED_MS, Adapters, most_reads
 from backend.station.bench import Bench
 from drivers.adapters import is_same_port, require_serial_form
 from drivers.computer.latency_timer import InForce

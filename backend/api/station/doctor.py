@@ -19,10 +19,10 @@ from backend.api.station.models_doctor import (
     TrialResult,
 )
 from backend.api.station.routes import require_bus
-from backend.audit.asked import note_before
+from backend.foundation.work.jobs import JobResult, Progress
+from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from backend.tools.wire_message import MessageInfo
-from backend.work.jobs import JobResult, Progress
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.examined import Examines
 from drivers.doctor.trials import Trial

@@ -14,8 +14,8 @@ from backend.api.context import Connection, TheBench
 from backend.api.named_profile import profile_named
 from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
 from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
-from backend.audit.asked import note_before
-from backend.drive.identity import confirm_identity
+from backend.axes.drive.identity import confirm_identity
+from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from drivers.errors import OutOfRange
 from drivers.ethercat.eeprom.expected import against_profile

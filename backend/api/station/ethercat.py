@@ -22,10 +22,10 @@ from backend.api.station.models_ethercat import (
     SegmentPort,
     SegmentStation,
 )
-from backend.drive.identity import confirm_identity
+from backend.axes.drive.identity import confirm_identity
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
-from backend.work.jobs import JobResult, Progress
 from drivers.adapters import require_ethercat_adapter
 from drivers.cia402 import State
 from drivers.computer import permissions

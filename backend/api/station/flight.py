@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from backend.api.context import TheBench
 from backend.api.errors import NotFound
-from backend.recording.flight import file_name
+from backend.records.recording.flight import file_name
 from drivers.errors import NotAllowed
 
 router = APIRouter()

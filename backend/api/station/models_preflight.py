@@ -7,8 +7,8 @@ from datetime import datetime
 from pydantic import Field
 
 from backend.api.models import Message
-from backend.preflight.findings import Code, Fix
-from backend.preflight.verdicts import Grade, Purpose
+from backend.foundation.preflight.findings import Code, Fix
+from backend.foundation.preflight.verdicts import Grade, Purpose
 from drivers.computer.latency_timer import LATENCY_MS, InForce
 
 

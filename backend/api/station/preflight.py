@@ -20,15 +20,21 @@ from backend.api.station.models_preflight import (
     PreflightUndone,
     PreflightVerdict,
 )
-from backend.preflight import kept
-from backend.preflight.findings import Finding
-from backend.preflight.fixes import Fixes
-from backend.preflight.run import judged, preflight
-from backend.preflight.texts import Language, fix_name, purpose_name, verdict_words, words
-from backend.preflight.verdicts import Verdict
+from backend.foundation.preflight import kept
+from backend.foundation.preflight.findings import Finding
+from backend.foundation.preflight.fixes import Fixes
+from backend.foundation.preflight.run import judged, preflight
+from backend.foundation.preflight.texts import (
+    Language,
+    fix_name,
+    purpose_name,
+    verdict_words,
+    words,
+)
+from backend.foundation.preflight.verdicts import Verdict
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.box.roles import require_not_office
-from backend.work.jobs import JobResult, Progress
 from drivers.computer.lateness import EDGES_US, Measured
 from drivers.errors import Busy
 from drivers.texts.message import text

@@ -36,13 +36,13 @@ from backend.api.station.models import (
     ProfileInfo,
     ScanRequest,
 )
-from backend.audit import Fact
-from backend.audit.asked import note_before
-from backend.people.rights import Right
+from backend.foundation.people.rights import Right
+from backend.foundation.work.jobs import Job, JobResult, Progress
+from backend.records.audit import Fact
+from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.second_port import require_same_drive
-from backend.work.jobs import Job, JobResult, Progress
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts.message import Text, text

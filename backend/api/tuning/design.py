@@ -34,8 +34,8 @@ from backend.api.tuning.models import (
     RealisedInfo,
     Undo,
 )
-from backend.drive.drive import Drive
-from backend.library.measurements import BadMeasurement, unpack
+from backend.axes.drive.drive import Drive
+from backend.records.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive

@@ -23,9 +23,11 @@ from backend.api.tuning import measurements as routes_measurements
 from backend.api.tuning import response_import as routes_response_import
 from backend.api.tuning.measurements import change_log
 from backend.api.tuning.models import ExcitationInfo, ToolInfo
-from backend.axis.cyclic_mode import keeping_mode
-from backend.axis.restoring import shielded
-from backend.library.measurements import MeasurementStore
+from backend.axes.axis.cyclic_mode import keeping_mode
+from backend.axes.axis.restoring import shielded
+from backend.foundation.work import libraries
+from backend.foundation.work.jobs import JobResult, Progress
+from backend.records.library.measurements import MeasurementStore
 from backend.report.changes import Change
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
@@ -39,8 +41,6 @@ from backend.tools.sweep import profile_speed
 from backend.tools.sweep.preview import preview
 from backend.tools.sweep.settings import SweepRequest
 from backend.tools.tool import AnyTool, Run, ToolResult, ToolSettings
-from backend.work import libraries
-from backend.work.jobs import JobResult, Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import text
 

@@ -12,7 +12,7 @@ from backend.api.context import Me, TheBench
 from backend.api.disposition import disposition
 from backend.api.errors import NotFound, message_of, words_of
 from backend.api.tuning.models import MeasurementContent, MeasurementInfo, SignatureRequest
-from backend.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
+from backend.records.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
 from backend.report.changes import ChangeLog
 from backend.station.bench import Bench
 from backend.station.evaluation import evaluate

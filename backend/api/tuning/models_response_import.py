@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from backend.api.models import Message
-from backend.response_import.units import InputUnit, OutputUnit
+from backend.records.response_import.units import InputUnit, OutputUnit
 
 
 class RecordingColumn(Message):

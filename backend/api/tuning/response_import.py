@@ -15,9 +15,9 @@ from backend.api.context import TheBench
 from backend.api.tuning.measurements import info_of
 from backend.api.tuning.models import MeasurementInfo
 from backend.api.tuning.models_response_import import ImportQuery, RecordingPreview
-from backend.library.measurements import SUFFIX
-from backend.response_import.evaluation import ImportSettings
-from backend.response_import.process import ImportTask, import_in_process
+from backend.records.library.measurements import SUFFIX
+from backend.records.response_import.evaluation import ImportSettings
+from backend.records.response_import.process import ImportTask, import_in_process
 
 router = APIRouter()
 FileName = Annotated[str, Query(max_length=200, description="name of the file, for messages")]

@@ -13,17 +13,17 @@ import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 
-from backend.axis import restoring
-from backend.axis.cyclic import CyclicSession
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.axis.scaled import ScaledAxis
-from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop
-from backend.drive.drive import Drive
-from backend.drive.optional import existing, torque_limits
-from backend.motion.authority import UNATTENDED_S
-from backend.motion.envelope import Envelope
-from backend.motion.grant import Grant
-from backend.people.identity import acting
+from backend.axes.axis import restoring
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axes.axis.scaled import ScaledAxis
+from backend.axes.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing, torque_limits
+from backend.axes.motion.authority import UNATTENDED_S
+from backend.axes.motion.envelope import Envelope
+from backend.axes.motion.grant import Grant
+from backend.foundation.people.identity import acting
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, OutOfRange, ProtocolError

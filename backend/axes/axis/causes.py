@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import contextlib
 
-from backend.drive.drive import Drive
-from backend.drive.faults import integer
-from backend.drive.terminals import read_terminals
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.faults import integer
+from backend.axes.drive.terminals import read_terminals
 from drivers.errors import DriveError
 from drivers.texts.message import Text, profile_text, text
 

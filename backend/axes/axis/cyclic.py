@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
-from backend.drive.ports import Port, address_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
+from backend.axes.drive.ports import Port, address_of
 from drivers.errors import Busy, DriveError, NotAllowed
 from drivers.link import (
     Cyclic,

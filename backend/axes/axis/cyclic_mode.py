@@ -11,12 +11,12 @@ import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from backend.axis import loop
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
-from backend.drive.drive import Drive
-from backend.drive.identity import confirm_identity
+from backend.axes.axis import loop
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.restoring import CLEANUP_TIMEOUT_S, RestoreFailed, shielded
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import confirm_identity
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.texts.message import text

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis
-from backend.drive.catalog import functions_of
-from backend.drive.drive import Drive
-from backend.drive.faults import integer
-from backend.drive.readings import Reading
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.catalog import functions_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.faults import integer
+from backend.axes.drive.readings import Reading
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, prose, text
 from profiles.functions import FaultHistory, HistorySlot

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from backend.motion.grant import Grant
+from backend.axes.motion.grant import Grant
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from drivers.link import Coupled, OwnsPowerState, Trajectory
 
 if TYPE_CHECKING:
-    from backend.axis.cyclic import CyclicSession
-    from backend.drive.drive import Drive
+    from backend.axes.axis.cyclic import CyclicSession
+    from backend.axes.drive.drive import Drive
 
 
 async def drive_to(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 
-from backend.axis.scaled import ScaledAxis
-from backend.scales.units import AxisUnits
-from backend.scales.words import halt_remedy, halt_words
+from backend.axes.axis.scaled import ScaledAxis
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scales.words import halt_remedy, halt_words
 from drivers.errors import motion_halted
 from drivers.motion.guard import SpeedGuard
 from drivers.texts.message import text

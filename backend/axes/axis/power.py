@@ -9,21 +9,21 @@ import time
 from contextlib import AbstractContextManager
 from functools import partial
 
-from backend.axis import loop
-from backend.axis.causes import hints
-from backend.axis.cyclic import CyclicSession
-from backend.axis.restoring import shielded
-from backend.axis.stop.braking import brake_then_quick_stop, quick_stop_coasts
-from backend.axis.stop.facts import StepCode, StopStep
-from backend.axis.stop.settings import settings_keys
-from backend.drive.drive import Drive
-from backend.drive.faults import read_active_faults
-from backend.drive.ports import address_of
-from backend.motion.authority import Ended
-from backend.motion.envelope import Envelope
-from backend.motion.grant import Grant
-from backend.motion.stopping import stops
-from backend.people.identity import arrived_s
+from backend.axes.axis import loop
+from backend.axes.axis.causes import hints
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.restoring import shielded
+from backend.axes.axis.stop.braking import brake_then_quick_stop, quick_stop_coasts
+from backend.axes.axis.stop.facts import StepCode, StopStep
+from backend.axes.axis.stop.settings import settings_keys
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.faults import read_active_faults
+from backend.axes.drive.ports import address_of
+from backend.axes.motion.authority import Ended
+from backend.axes.motion.envelope import Envelope
+from backend.axes.motion.grant import Grant
+from backend.axes.motion.stopping import stops
+from backend.foundation.people.identity import arrived_s
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.codec import encode

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from backend.scales.gear_calculator import Mechanics
-from backend.scales.taught import Taught
-from backend.store.files import write_atomically
+from backend.axes.scales.gear_calculator import Mechanics
+from backend.axes.scales.taught import Taught
+from backend.foundation.store.files import write_atomically
 
 
 class AxisRecord(BaseModel):

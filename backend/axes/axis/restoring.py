@@ -7,8 +7,8 @@ import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 
-from backend.drive.drive import Drive
-from backend.drive.identity import confirm_identity
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import confirm_identity
 from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import Text, joined, parts_of, text
 from profiles.schema import Raw

@@ -8,14 +8,14 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from backend.axis.power import PowerState
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.motion.grant import Grant
-from backend.scales.resolve import stating_keys
-from backend.scales.scale import ScaleChanged, Scales
-from backend.scales.taught import Taught
-from backend.scales.units import AxisUnits, read_units
+from backend.axes.axis.power import PowerState
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.grant import Grant
+from backend.axes.scales.resolve import stating_keys
+from backend.axes.scales.scale import ScaleChanged, Scales
+from backend.axes.scales.taught import Taught
+from backend.axes.scales.units import AxisUnits, read_units
 from drivers.errors import DriveError
 from drivers.texts.message import Text
 from profiles.schema import Raw

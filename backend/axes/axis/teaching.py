@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from backend.axis.axis import Axis
-from backend.scales.resolve import read_reported
-from backend.scales.taught import Taught
-from backend.scales.units_found import nearest_unit
+from backend.axes.axis.axis import Axis
+from backend.axes.scales.resolve import read_reported
+from backend.axes.scales.taught import Taught
+from backend.axes.scales.units_found import nearest_unit
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 

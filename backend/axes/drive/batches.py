@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Sequence
 
-from backend.drive.exclusive import ExclusiveAccess, ExclusiveAccessHeld
-from backend.drive.ports import Port, address_of
+from backend.axes.drive.exclusive import ExclusiveAccess, ExclusiveAccessHeld
+from backend.axes.drive.ports import Port, address_of
 from drivers.errors import DriveError, LinkTimeout, NotAsked
 from profiles.schema import Parameter
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from backend.drive.readings import Reading
+from backend.axes.drive.readings import Reading
 from profiles.schema import Raw
 
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from backend.drive.ports import Port, address_of
-from backend.drive.readable import ReadableDrive
-from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
-from backend.drive.value_check import checked, named
-from backend.motion.alternatives import refused
-from backend.motion.classes import held_still, motion_of
-from backend.motion.grant import Grant
-from backend.motion.stopping import stops
+from backend.axes.drive.ports import Port, address_of
+from backend.axes.drive.readable import ReadableDrive
+from backend.axes.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
+from backend.axes.drive.value_check import checked, named
+from backend.axes.motion.alternatives import refused
+from backend.axes.motion.classes import held_still, motion_of
+from backend.axes.motion.grant import Grant
+from backend.axes.motion.stopping import stops
 from drivers import cia402
 from drivers.codec import encode
 from drivers.errors import (
@@ -46,7 +46,7 @@ class Drive(ReadableDrive):
         """Check a raw value and return it as it will be written.
 
         Raises:
-            NotAllowed, OutOfRange: as `backend.drive.value_check.checked`.
+            NotAllowed, OutOfRange: as `backend.axes.drive.value_check.checked`.
         """
         return checked(self.name, self.profile.drive, parameter, raw)
 

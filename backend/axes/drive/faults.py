@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
 from drivers.texts.profile_words import FAULT_BY_RECORD, FAULT_LOOK_UP, FAULT_UNKNOWN
 from profiles.schema import Fault
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 from drivers.codec import serial_or_none
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address

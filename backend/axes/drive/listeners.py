@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backend.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
+from backend.axes.drive.readings import CommandRecord, Reading, Refusal, WriteRecord
 
 
 class DriveListeners:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
 from drivers.errors import NotAllowed, Rejected
 
 #: Abort codes of an object or subindex that the drive does not have (CiA 301 table 22).

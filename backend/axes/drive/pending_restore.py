@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Protocol
 
-from backend.drive.readings import Reading
+from backend.axes.drive.readings import Reading
 from profiles.schema import Raw
 
 

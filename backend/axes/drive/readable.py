@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from backend.drive.batches import asked_in_batches
-from backend.drive.change_marks import ChangeMarks
-from backend.drive.exclusive import ExclusiveAccess
-from backend.drive.listeners import DriveListeners
-from backend.drive.motion_keys import command_keys, motion_keys
-from backend.drive.pending_restore import PendingRestores
-from backend.drive.ports import Port, address_of, port_for, unreachable_why
-from backend.drive.readings import Reading
-from backend.drive.value_check import named
-from backend.motion.authority import MotionAuthority
+from backend.axes.drive.batches import asked_in_batches
+from backend.axes.drive.change_marks import ChangeMarks
+from backend.axes.drive.exclusive import ExclusiveAccess
+from backend.axes.drive.listeners import DriveListeners
+from backend.axes.drive.motion_keys import command_keys, motion_keys
+from backend.axes.drive.pending_restore import PendingRestores
+from backend.axes.drive.ports import Port, address_of, port_for, unreachable_why
+from backend.axes.drive.readings import Reading
+from backend.axes.drive.value_check import named
+from backend.axes.motion.authority import MotionAuthority
 from drivers import cia402
 from drivers.codec import decode
 from drivers.errors import (

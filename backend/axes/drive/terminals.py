@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from backend.drive.catalog import functions_of
-from backend.drive.drive import Drive
-from backend.drive.faults import integer
-from backend.drive.readings import Reading
+from backend.axes.drive.catalog import functions_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.faults import integer
+from backend.axes.drive.readings import Reading
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from profiles.functions import TerminalBits, TerminalFacts
 from profiles.schema import IoTerminal

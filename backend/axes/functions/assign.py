@@ -11,13 +11,13 @@ from __future__ import annotations
 import asyncio
 import time
 
-from backend.axis.axis import Axis
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.drive.readings import Reading
-from backend.drive.terminals import TerminalState, read_terminals
-from backend.motion.alternatives import alternative_of
-from backend.motion.classes import motion_of
-from backend.motion.grant import NotGranted
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axes.drive.readings import Reading
+from backend.axes.drive.terminals import TerminalState, read_terminals
+from backend.axes.motion.alternatives import alternative_of
+from backend.axes.motion.classes import motion_of
+from backend.axes.motion.grant import NotGranted
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, profile_text, text

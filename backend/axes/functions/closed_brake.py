@@ -6,8 +6,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Literal
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from profiles.functions import Forcing

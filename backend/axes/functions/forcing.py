@@ -13,13 +13,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from backend.axis.axis import Axis
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.drive.catalog import functions_of
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.motion.grant import Grant
-from backend.work.jobs import Job, JobResult, JobRunner, Progress
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axes.drive.catalog import functions_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.grant import Grant
+from backend.foundation.work.jobs import Job, JobResult, JobRunner, Progress
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from drivers.texts import limits

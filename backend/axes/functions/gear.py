@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis
-from backend.axis.restoring import CLEANUP_TIMEOUT_S, shielded
-from backend.scales.gear_calculator import GearPlan, GearValue, Mechanics, plan_gear
-from backend.scales.units import encoder_counts
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.restoring import CLEANUP_TIMEOUT_S, shielded
+from backend.axes.scales.gear_calculator import GearPlan, GearValue, Mechanics, plan_gear
+from backend.axes.scales.units import encoder_counts
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed, Rejected
 from drivers.texts.message import Text, joined, text

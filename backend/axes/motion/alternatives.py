@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.motion.grant import NotGranted
+from backend.axes.motion.grant import NotGranted
 from drivers.texts.message import Text, profile_text, text
 from profiles.schema import Parameter, Profile
 

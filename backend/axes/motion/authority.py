@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from dataclasses import dataclass
 
-from backend.motion.envelope import Envelope
-from backend.motion.grant import Grant, NotGranted
-from backend.people.identity import acting_person, acting_session
+from backend.axes.motion.envelope import Envelope
+from backend.axes.motion.grant import Grant, NotGranted
+from backend.foundation.people.identity import acting_person, acting_session
 from drivers.errors import Busy
 from drivers.texts.message import Text, text
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.motion.travel_unit import TravelUnit
+from backend.axes.motion.travel_unit import TravelUnit
 
 
 @dataclass(frozen=True, slots=True)

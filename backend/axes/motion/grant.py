@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.motion.envelope import Envelope
+from backend.axes.motion.envelope import Envelope
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text
 
@@ -13,7 +13,7 @@ from drivers.texts.message import Text
 class Grant:
     """Permission for one motion: person, axis, purpose, time limit and envelope.
 
-    Only grants issued by `backend.motion.authority.MotionAuthority` are live; one constructed
+    Only grants issued by `backend.axes.motion.authority.MotionAuthority` are live; one constructed
     elsewhere is not. Two grants are equal only if they are the same object.
 
     ``drive`` is the drive's id. ``actor`` is the person, empty where the program acts by itself.
@@ -42,7 +42,7 @@ class Grant:
 class NotGranted(NotAllowed):
     """Raised when something could put energy into a motor without a grant of the motion authority.
 
-    ``page`` and ``route`` are where it can be done (`backend.motion.alternatives`), or empty.
+    ``page`` and ``route`` are where it can be done (`backend.axes.motion.alternatives`), or empty.
     """
 
     kind = "not-granted"

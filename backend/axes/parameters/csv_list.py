@@ -15,9 +15,9 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from backend.drive.readings import Reading
-from backend.parameters.set_file import MAX_BYTES, BadSet, Row
-from backend.store.spreadsheet import as_text
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters.set_file import MAX_BYTES, BadSet, Row
+from backend.foundation.store.spreadsheet import as_text
 from drivers.texts.message import Text, Unsuitable, text
 from profiles.schema import Parameter, Profile, Raw
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from datetime import datetime
 
-from backend.drive.readings import Reading
-from backend.parameters.csv_list import ParameterList, first
-from backend.parameters.set_file import BadSet, Row
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters.csv_list import ParameterList, first
+from backend.axes.parameters.set_file import BadSet, Row
 from drivers.texts.imports import failure_text, finding_line
 from drivers.texts.message import Text, text
 from profiles.importer import (

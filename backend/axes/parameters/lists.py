@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from backend.drive.drive import Drive
-from backend.parameters.csv_list import ParameterList, read_csv, write_csv
-from backend.parameters.dcf import read_dcf, write_dcf
-from backend.parameters.set_file import ParameterSet, dump
+from backend.axes.drive.drive import Drive
+from backend.axes.parameters.csv_list import ParameterList, read_csv, write_csv
+from backend.axes.parameters.dcf import read_dcf, write_dcf
+from backend.axes.parameters.set_file import ParameterSet, dump
 from drivers.link import Found
 from profiles.importer import is_dcf, read_dcf_identity
 from profiles.schema import Profile

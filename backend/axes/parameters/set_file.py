@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.motion.alternatives import refused
-from backend.motion.classes import motion_of
-from backend.parameters.toml_keys import deepest_key
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.motion.alternatives import refused
+from backend.axes.motion.classes import motion_of
+from backend.axes.parameters.toml_keys import deepest_key
 from drivers.errors import DriveError, NotAllowed, with_remedy
 from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile, Raw

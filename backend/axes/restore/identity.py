@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.drive.drive import Drive
-from backend.drive.identity import place_of
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import place_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from backend.drive.drive import Drive
-from backend.restore.identity import identity_of
-from backend.restore.store import RestoreList
-from backend.store.files import StorageFailed
+from backend.axes.drive.drive import Drive
+from backend.axes.restore.identity import identity_of
+from backend.axes.restore.store import RestoreList
+from backend.foundation.store.files import StorageFailed
 from drivers.texts.message import text
 
 

@@ -18,10 +18,10 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from backend.drive.pending_restore import PendingRestore
-from backend.restore.identity import DriveIdentity
-from backend.restore.process import lives, this_process
-from backend.store.files import StorageFailed, write_atomically
+from backend.axes.drive.pending_restore import PendingRestore
+from backend.axes.restore.identity import DriveIdentity
+from backend.axes.restore.process import lives, this_process
+from backend.foundation.store.files import StorageFailed, write_atomically
 from profiles.schema import Raw
 
 #: Time after the last write of the list for which a motion is attributed to the killed process [s];

@@ -247,7 +247,7 @@ def _most(profile: Profile, key: str | None) -> int:
 
 
 def _reached(profile: Profile, raws: dict[str, int], counts: int) -> Fraction:
-    """User increments per motor revolution by the rule of `backend.scales.units.read_units`."""
+    """User increments per motor revolution, by the rule of `units.read_units`."""
     spec = profile.units
     ratio = Fraction(raws[str(spec.gear_numerator)], raws[str(spec.gear_denominator)])
     if spec.feed is None:

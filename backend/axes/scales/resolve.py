@@ -12,10 +12,10 @@ import re
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
-from backend.scales.scale import Origin, Quantity, Scale, Scales, Uncertainty
-from backend.scales.taught import Taught
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
+from backend.axes.scales.scale import Origin, Quantity, Scale, Scales, Uncertainty
+from backend.axes.scales.taught import Taught
 from profiles.schema import UnitSpec
 from profiles.si_unit import SiUnit, decode_si_unit
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
+from backend.axes.scales.gear_calculator import Mechanics
 from drivers.errors import NotAllowed
 
 if TYPE_CHECKING:
-    from backend.scales.units import AxisUnits
+    from backend.axes.scales.units import AxisUnits
 
 
 def travel_unit(drive: str, name: str, mechanics: Mechanics | None, units: AxisUnits) -> TravelUnit:

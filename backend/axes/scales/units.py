@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Container
 from dataclasses import dataclass, replace
 
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
-from backend.scales.resolve import by_text, origin_of, read_reported, scales_of
-from backend.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
-from backend.scales.taught import Taught
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
+from backend.axes.scales.resolve import by_text, origin_of, read_reported, scales_of
+from backend.axes.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
+from backend.axes.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.feedback import FeedbackScale
 from drivers.texts import limits

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.scales.units import AxisUnits
+from backend.axes.scales.units import AxisUnits
 from drivers.feedback import Disagreement, disagreement
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
 from drivers.texts.message import Text, text

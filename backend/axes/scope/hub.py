@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.drive.readings import Reading
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.readings import Reading
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 

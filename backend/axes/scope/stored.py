@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from backend.store.files import StorageFailed, checked_name, new_name, write_atomically
-from backend.store.free_space import RESERVE_BYTES, free_bytes
+from backend.foundation.store.files import StorageFailed, checked_name, new_name, write_atomically
+from backend.foundation.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import Text, text

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.drive.drive import Drive
-from backend.scales.units import AxisUnits
+from backend.axes.drive.drive import Drive
+from backend.axes.scales.units import AxisUnits
 from profiles.schema import Parameter
 
 #: Roles of each quantity, for parameters that may state another unit.

@@ -8,8 +8,8 @@ import time
 from collections import deque
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis
-from backend.scales.units import AxisUnits
+from backend.axes.axis.axis import Axis
+from backend.axes.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout
 

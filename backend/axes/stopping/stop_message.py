@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.axis.stop.facts import AxisStop, Verdict
+from backend.axes.axis.stop.facts import AxisStop, Verdict
 from drivers.texts.message import Text, text
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from backend.scales.units import AxisUnits
+from backend.axes.scales.units import AxisUnits
 from drivers.cia402 import State
 from drivers.texts.message import Text, text
 

@@ -15,16 +15,16 @@ import contextlib
 import time
 from collections.abc import Awaitable, Callable
 
-from backend.axis import loop
-from backend.axis.axis import Axis
-from backend.axis.restoring import shielded
-from backend.axis.stop.facts import AxisStop, StepCode, Verdict
-from backend.axis.stop.settings import (
+from backend.axes.axis import loop
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.restoring import shielded
+from backend.axes.axis.stop.facts import AxisStop, StepCode, Verdict
+from backend.axes.axis.stop.settings import (
     OPTION,
     deceleration_rpm_s,
     known_settings,
 )
-from backend.stopping.speed import DWELL_S, LOOK_S, Sample, SpeedWatch, units_of
+from backend.axes.stopping.speed import DWELL_S, LOOK_S, Sample, SpeedWatch, units_of
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout

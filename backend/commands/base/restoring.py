@@ -6,14 +6,14 @@ import sys
 from collections.abc import Mapping
 from datetime import datetime
 
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.restore.identity import identity_of
+from backend.axes.restore.keep import keep_list
+from backend.axes.restore.store import Pending, RestoreStore
 from backend.commands.base.printing import note
 from backend.commands.base.state import state_folder
-from backend.drive.drive import Drive
-from backend.restore.identity import identity_of
-from backend.restore.keep import keep_list
-from backend.restore.store import Pending, RestoreStore
-from backend.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed
 from backend.tools.measuring.restore import settle
 from drivers.errors import Busy, NotAllowed
 

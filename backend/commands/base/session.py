@@ -12,14 +12,14 @@ from typing import ParamSpec, TypeVar
 
 import typer
 
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.restore.store import Pending
 from backend.commands.base.printing import note
 from backend.commands.base.restoring import recall
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.restore.store import Pending
+from backend.foundation.work.jobs import Progress
+from backend.foundation.work.sleep_watch import SleepWatch
 from backend.station.matching import match_profiles, profile_for
-from backend.work.jobs import Progress
-from backend.work.sleep_watch import SleepWatch
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import platformdirs
 
-from backend.store import state_version
+from backend.foundation.store import state_version
 from drivers.computer.files import longest_path
 from drivers.errors import NotAllowed
 

@@ -11,7 +11,7 @@ import typer
 from backend.commands.base.options import Server, Url, server_for
 from backend.commands.base.printing import print_text
 from backend.commands.base.session import opened, run, show_progress
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 app = typer.Typer(no_args_is_help=True, help="What goes over the wires of a bus.")

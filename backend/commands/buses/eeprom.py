@@ -11,7 +11,7 @@ import typer
 from backend.commands.base.options import Json, Server, Station, Url, server_for
 from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.session import opened, run, show_progress
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.ethercat.eeprom.expected import against_profile
 from drivers.ethercat.eeprom.image import Difference, Image, differences

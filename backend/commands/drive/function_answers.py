@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from backend.api.drive.models_axis import ActiveFault
-from backend.scales.gear_calculator import GearPlan
+from backend.axes.scales.gear_calculator import GearPlan
 from drivers.texts.message import language
 from profiles.schema import Raw
 

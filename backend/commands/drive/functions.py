@@ -10,14 +10,14 @@ from typing import Annotated, Literal, Protocol
 import typer
 from pydantic import ValidationError
 
+from backend.axes.functions.regeneration import BrakingCycle, BrakingLimits, Resistor
+from backend.axes.functions.regeneration import braking as braking_of
+from backend.axes.scales.gear_calculator import Mechanics, plan_gear
 from backend.commands.base.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.session import reporting_errors, run
 from backend.commands.drive import local_functions, remote_functions
 from backend.commands.drive.function_answers import Faults, Gear, Terminal, of_plan
-from backend.functions.regeneration import BrakingCycle, BrakingLimits, Resistor
-from backend.functions.regeneration import braking as braking_of
-from backend.scales.gear_calculator import Mechanics, plan_gear
 from drivers.errors import OutOfRange
 from drivers.texts import limits as limit_texts
 from drivers.texts.message import language

@@ -10,15 +10,17 @@ from typing import Annotated, get_args
 
 import typer
 
+from backend.axes.parameters.set_file import ParameterSet, parse
 from backend.commands.base.options import Json, Profile, Server, Station, Url, place
 from backend.commands.base.printing import note, print_text, words_of
 from backend.commands.base.session import run
 from backend.commands.drive.drive_values import Now, values_now
 from backend.commands.drive.values import bytes_of
-from backend.handover.conflicts import Conflict, Verdict, changed_since
-from backend.handover.conflicts import compare as compared
-from backend.handover.esi import controllers_of
-from backend.handover.files import (
+from backend.foundation.store.files import write_atomically
+from backend.records.handover.conflicts import Conflict, Verdict, changed_since
+from backend.records.handover.conflicts import compare as compared
+from backend.records.handover.esi import controllers_of
+from backend.records.handover.files import (
     FORMATS,
     Format,
     digest,
@@ -28,10 +30,8 @@ from backend.handover.files import (
     wanted_of,
     with_controllers,
 )
-from backend.handover.model import AxisHandover, Choice, hand_over
-from backend.handover.read import read_list
-from backend.parameters.set_file import ParameterSet, parse
-from backend.store.files import write_atomically
+from backend.records.handover.model import AxisHandover, Choice, hand_over
+from backend.records.handover.read import read_list
 from drivers.errors import NotAllowed
 from drivers.texts.message import joined, language
 from profiles import load_profile

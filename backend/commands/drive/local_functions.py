@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from backend.api.drive.models_axis import ActiveFault
-from backend.axis.axis import Axis
-from backend.axis.fault_history import history_of, read_history
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.fault_history import history_of, read_history
+from backend.axes.drive.faults import read_active_faults
+from backend.axes.drive.terminals import read_terminals
+from backend.axes.functions import gear as gears
+from backend.axes.scales.gear_calculator import Mechanics
 from backend.commands.base.options import Place
 from backend.commands.base.session import drive_at
 from backend.commands.drive.function_answers import Faults, Gear, Past, Terminal, of_plan
-from backend.drive.faults import read_active_faults
-from backend.drive.terminals import read_terminals
-from backend.functions import gear as gears
-from backend.scales.gear_calculator import Mechanics
 from drivers.texts.message import language
 
 

@@ -6,18 +6,18 @@ import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import ParameterSet
 from backend.commands.base.options import Place
 from backend.commands.base.printing import print_text
 from backend.commands.base.restoring import require_own_values, show_restored, stop_what_was_moved
 from backend.commands.base.session import drive_and_pending, drive_at, progress, show_progress
 from backend.commands.drive import values
 from backend.commands.drive.values import Compared
-from backend.drive.drive import Drive
-from backend.library import SetLibrary
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import ParameterSet
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
+from backend.records.library import SetLibrary
 from backend.tools import parameters
 from backend.tools.measuring.restore import settle
 from backend.tools.moves import procedures

@@ -9,14 +9,14 @@ from typing import Annotated, Protocol
 
 import typer
 
+from backend.axes.parameters.lists import export_list, import_list
+from backend.axes.parameters.set_file import SUFFIX, parse
 from backend.commands.base.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.base.printing import print_text
 from backend.commands.base.session import run
 from backend.commands.drive import local_params, remote_params
 from backend.commands.drive.values import bytes_of
-from backend.parameters.lists import export_list, import_list
-from backend.parameters.set_file import SUFFIX, parse
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts.message import language
 from profiles import load_profile

@@ -13,13 +13,13 @@ from typing import Annotated, cast, get_args
 
 import typer
 
-from backend.audit import Fact
-from backend.audit.facts import Value
 from backend.commands.base.printing import print_text
 from backend.commands.base.session import opened, reporting_errors, show_progress
 from backend.commands.server.keep import station_records
+from backend.foundation.store.files import write_atomically
+from backend.records.audit import Fact
+from backend.records.audit.facts import Value
 from backend.station.description import profile_of_drive
-from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts.checks import check_line
 from drivers.texts.imports import failure_text, finding_line, summary_text

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from backend.api.drive.models_axis import ActiveFault
 from backend.api.drive.models_functions import FaultHistoryInfo, GearPlanInfo, GearWritten, IoInfo
+from backend.axes.scales.gear_calculator import Mechanics
 from backend.commands.base.options import Place
 from backend.commands.drive.function_answers import Faults, Gear, Past, Terminal
 from backend.commands.drive.remote_params import remote_drive
-from backend.scales.gear_calculator import Mechanics
 
 
 async def terminals(place: Place) -> tuple[str, list[Terminal]]:

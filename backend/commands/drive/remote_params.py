@@ -13,14 +13,14 @@ from backend.api.drive.models_parameters import ParameterRow, ParameterValue
 from backend.api.library.models import StoredSet
 from backend.api.sets.models import Diff
 from backend.api.station.models import DriveSummary, FoundDrive
+from backend.axes.parameters.set_file import parse
 from backend.commands.base.options import Place
 from backend.commands.base.printing import note, print_text
 from backend.commands.base.remote import Remote, remote
 from backend.commands.base.restoring import show_restored
 from backend.commands.drive import values
 from backend.commands.drive.values import Compared
-from backend.parameters.set_file import parse
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 

@@ -15,18 +15,18 @@ import typer
 from pydantic import ValidationError
 
 from backend.api.drive.models_scales import ScalesInfo, SmallMoveResult
-from backend.axis import teaching
-from backend.axis.axis import Axis
+from backend.axes.axis import teaching
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.identity import place_of, read_serial
+from backend.axes.scales.scale import Scale, what_to_do
+from backend.axes.scales.taught import Taught, TaughtDrive
 from backend.commands.base.options import Json, Place, Profile, Server, Station, Url, place
 from backend.commands.base.printing import words_of
 from backend.commands.base.session import drive_at, progress, run, run_in_order
 from backend.commands.base.state import state_folder
 from backend.commands.drive.remote_params import remote_drive
-from backend.drive.drive import Drive
-from backend.drive.identity import place_of, read_serial
-from backend.scales.scale import Scale, what_to_do
-from backend.scales.taught import Taught, TaughtDrive
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.texts.message import language
 
 app = typer.Typer(
@@ -217,7 +217,7 @@ async def _teach_there(where: Place, increments: int, torque: float, cycle_ms: f
 async def _teach_here(
     where: Place, increments: int, torque: float, cycle_ms: float, state: Path | None
 ) -> None:
-    from backend.axis.cyclic import CyclicSession
+    from backend.axes.axis.cyclic import CyclicSession
     from backend.tools.moves.small_move import SmallMoveSettings, small_move
 
     async with _axis_at(where, state) as axis:

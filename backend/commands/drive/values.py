@@ -10,8 +10,8 @@ from typing import NamedTuple, Protocol, TypeVar
 
 import typer
 
+from backend.axes.parameters import set_file as parameter_set
 from backend.commands.base.printing import note, print_text, words_of
-from backend.parameters import set_file as parameter_set
 from backend.tools.parameters import without
 from drivers.errors import NotAllowed
 from drivers.texts.message import language

@@ -8,12 +8,12 @@ from typing import Annotated, Any
 import typer
 
 from backend.api.station.models import DriveSummary
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.commands.base.printing import words_of
 from backend.commands.base.remote import Remote
 from backend.commands.measuring.measure import Answer
 from backend.commands.measuring.tools import CommandExtras, command_of
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from backend.tools.friction.result import FrictionResult
 from backend.tools.registry import BY_KIND
 

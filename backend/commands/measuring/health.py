@@ -23,10 +23,10 @@ from backend.commands.base.session import run
 from backend.commands.measuring import health_permission
 from backend.commands.measuring.tools import command_of, lines_of
 from backend.commands.server.keep import Config, Database, station_records
-from backend.health.compare import CHECKS, LEAST_REPEATS
-from backend.health.records import HealthRecords
 from backend.tools.health.result import UNITS, HealthResult, Quantity
 from backend.tools.registry import BY_KIND
+from backend.tools.thresholds import trend_compare
+from backend.tools.trend.records import HealthRecords
 from backend.tools.wire_message import MessageInfo
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, language, text
@@ -86,7 +86,7 @@ def repeat(
             if known.baseline is None:
                 raise NotAllowed("health.no-baseline", axis=axis)
             # Consent is given for one motion only, so that of the baseline does not count.
-            body = {**known.baseline.settings, "rounds": CHECKS, "consent": consent}
+            body = {**known.baseline.settings, "rounds": trend_compare.CHECKS, "consent": consent}
             found = await at.result(f"/drives/{drive.id}/jobs/health", body)
             now = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
             if not as_json:
@@ -169,7 +169,7 @@ async def _drive(at: Remote, name: str) -> DriveSummary:
 async def _newest(at: Remote, drive: DriveSummary) -> list[int]:
     """Ids of the newest rounds: those of the last health check, but at least `LEAST_REPEATS`."""
     known = await at.ask("GET", f"/drives/{drive.id}/health", AxisHealth)
-    return [each.id for each in known.runs][-max(LEAST_REPEATS, _last_check(known)) :]
+    return [each.id for each in known.runs][-max(trend_compare.LEAST_REPEATS, _last_check(known)) :]
 
 
 def _last_check(known: AxisHealth) -> int:

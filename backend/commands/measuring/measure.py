@@ -11,14 +11,14 @@ from typing import Annotated, NamedTuple
 import typer
 
 from backend.api.station.models import DriveSummary
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
 from backend.commands.base.options import server_for
 from backend.commands.base.printing import print_text
 from backend.commands.base.remote import Remote, remote
 from backend.commands.base.restoring import restore_first
 from backend.commands.base.session import drive_and_pending, drive_on, opened, run_in_order
-from backend.store.files import StorageFailed, require_writable, write_atomically
+from backend.foundation.store.files import StorageFailed, require_writable, write_atomically
 from backend.tools.tool import ToolSettings
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
@@ -41,7 +41,7 @@ async def exchanging(
 
     ``closes_loops`` as in `Tool`.
     """
-    from backend.axis.cyclic_mode import keeping_mode
+    from backend.axes.axis.cyclic_mode import keeping_mode
     from backend.commands.drive.scales import take_taught
     from backend.tools.sweep import profile_speed
 

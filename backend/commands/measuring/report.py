@@ -16,10 +16,16 @@ from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.remote import remote
 from backend.commands.base.session import run
 from backend.commands.measuring.measure import AxisName, Profile, Station, Where
-from backend.library.measurements import SUFFIX, BadMeasurement, Head, MeasurementStore, unpack
+from backend.foundation.store.files import write_atomically
+from backend.records.library.measurements import (
+    SUFFIX,
+    BadMeasurement,
+    Head,
+    MeasurementStore,
+    unpack,
+)
 from backend.report.gather import About, choose, facts_of_files, measured_from
 from backend.report.store import FORMATS, Format, render
-from backend.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import typer
 
 from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.session import reported
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import Text, language, text
@@ -65,7 +65,7 @@ def columns(
     as_json: Annotated[bool, typer.Option("--json", help="for scripts")] = False,
 ) -> None:
     """List a recording's columns by number and name, with their first values and ranges."""
-    from backend.response_import.preview import preview
+    from backend.records.response_import.preview import preview
 
     with reported():
         found = preview(_bytes(file), file.name)
@@ -128,7 +128,7 @@ def import_(
     The excitation (periodic, chirp or noise) is found in the input. The band, ±1.96 std, is where
     another run of the same machine puts each line.
     """
-    from backend.response_import.evaluation import ImportSettings, evaluate_file
+    from backend.records.response_import.evaluation import ImportSettings, evaluate_file
 
     low, high = f_min if f_min is not None else 0.0, f_max if f_max is not None else 1e9
     settings = ImportSettings(
@@ -149,7 +149,7 @@ def import_(
 
 
 def _bytes(file: Path) -> bytes:
-    from backend.response_import.contents import MAX_FILE_BYTES
+    from backend.records.response_import.contents import MAX_FILE_BYTES
 
     size = file.stat().st_size
     if size > MAX_FILE_BYTES:

@@ -15,14 +15,14 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from backend.api.station.models import DriveSummary
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.commands.base.options import Json, Server
 from backend.commands.base.printing import table
 from backend.commands.base.remote import Remote
 from backend.commands.base.session import progress
 from backend.commands.measuring import measure
 from backend.commands.measuring.measure import Answer
-from backend.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Option, Row, Run, ToolResult
 from drivers.texts.message import language, text

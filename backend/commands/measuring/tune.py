@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from backend.api.station.models import DriveSummary
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.commands.base.printing import words_of
 from backend.commands.base.remote import Remote
 from backend.commands.measuring.measure import Answer

@@ -12,20 +12,20 @@ from typing import Annotated, Literal
 
 import typer
 
-from backend.audit.chain import Anchor
-from backend.audit.export_check import check_lines
-from backend.audit.trail import Filter
+from backend.axes.parameters import set_file as parameter_set
 from backend.commands.base.options import Json
 from backend.commands.base.printing import note, print_text
 from backend.commands.base.session import reporting_errors
 from backend.commands.base.state import chosen_folder, state_folder
-from backend.library.backup.backup import make_backup
-from backend.library.backup.restore import restore as restore_archive
-from backend.library.entries import KINDS, Kind, Query
-from backend.parameters import set_file as parameter_set
-from backend.people.identity import LOCAL, Actor, acting
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.work.journal import Journal
+from backend.records.audit.chain import Anchor
+from backend.records.audit.export_check import check_lines
+from backend.records.audit.trail import Filter
+from backend.records.library.backup.backup import make_backup
+from backend.records.library.backup.restore import restore as restore_archive
+from backend.records.library.entries import KINDS, Kind, Query
 from backend.station.records import Records
-from backend.work.journal import Journal
 from drivers.errors import NotAllowed
 
 audit = typer.Typer(help="Check and export the audit trail.", no_args_is_help=True)

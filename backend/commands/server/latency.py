@@ -12,7 +12,7 @@ import typer
 from backend.commands.base.printing import print_text
 from backend.commands.base.session import reporting_errors
 from backend.commands.base.state import state_folder
-from backend.preflight.adapters import LOWERED_MS, Adapters, Timer, most_reads
+from backend.foundation.preflight.adapters import LOWERED_MS, Adapters, Timer, most_reads
 from drivers.adapters import require_serial_form
 from drivers.computer.latency_timer import InForce
 

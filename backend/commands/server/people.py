@@ -12,10 +12,10 @@ import typer
 from backend.commands.base.printing import print_text
 from backend.commands.base.session import run
 from backend.commands.base.state import state_folder
-from backend.people.accounts import Accounts
-from backend.people.records import Account
-from backend.people.rights import Right, Role, role_text
-from backend.people.station import People
+from backend.foundation.people.accounts import Accounts
+from backend.foundation.people.records import Account
+from backend.foundation.people.rights import Right, Role, role_text
+from backend.foundation.people.station import People
 from drivers.errors import NotAllowed
 
 app = typer.Typer(help="Accounts of this station.", no_args_is_help=True)

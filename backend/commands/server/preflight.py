@@ -13,11 +13,17 @@ import typer
 from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.session import reporting_errors
 from backend.commands.base.state import state_folder
-from backend.preflight import kept
-from backend.preflight.findings import Effect, Fix
-from backend.preflight.fixes import Fixes
-from backend.preflight.run import Preflight, preflight
-from backend.preflight.texts import Language, fix_name, purpose_name, verdict_words, words
+from backend.foundation.preflight import kept
+from backend.foundation.preflight.findings import Effect, Fix
+from backend.foundation.preflight.fixes import Fixes
+from backend.foundation.preflight.run import Preflight, preflight
+from backend.foundation.preflight.texts import (
+    Language,
+    fix_name,
+    purpose_name,
+    verdict_words,
+    words,
+)
 from drivers.computer.lateness import EDGES_US, Histogram, Measured
 from drivers.errors import OutOfRange
 

@@ -21,17 +21,22 @@ from backend.api.app import make_app
 from backend.api.security.protocol import AcceptingConfig, PatientProtocol, PatientSocket
 from backend.api.station.models import Health
 from backend.commands.base.printing import print_text
-from backend.people.login.marker import AccountsMarker
-from backend.people.station import People
-from backend.people.tls import Certificate, machine_names, own_certificate, station_certificate
+from backend.foundation.people.login.marker import AccountsMarker
+from backend.foundation.people.station import People
+from backend.foundation.people.tls import (
+    Certificate,
+    machine_names,
+    own_certificate,
+    station_certificate,
+)
+from backend.foundation.store.database import FILE
+from backend.foundation.work import libraries
+from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
 from backend.station.box.announced import announced
 from backend.station.box.kept import Box, names_of, read
 from backend.station.box.roles import addresses_of
 from backend.station.box.shown import phone_address, scan_code
-from backend.store.database import FILE
-from backend.work import libraries
-from backend.work.journal import Entry
 from drivers.computer import scheduling
 from drivers.computer.processes import raise_descriptors
 from drivers.computer.sockets import take_port_alone

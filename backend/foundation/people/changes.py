@@ -10,11 +10,11 @@ from datetime import datetime
 
 from sqlalchemy import delete, update
 
-from backend.people.credentials import name_key
-from backend.people.records import Account, LoginSession, Token
-from backend.people.rights import Role
-from backend.people.tables import AccountRow, SessionRow, TokenRow
-from backend.store.database import Store
+from backend.foundation.people.credentials import name_key
+from backend.foundation.people.records import Account, LoginSession, Token
+from backend.foundation.people.rights import Role
+from backend.foundation.people.tables import AccountRow, SessionRow, TokenRow
+from backend.foundation.store.database import Store
 
 
 def add_account(store: Store, name: str, role: Role, password: str, created: datetime) -> Account:

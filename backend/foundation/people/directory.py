@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import datetime, timedelta
 
-from backend.people.credentials import digest, name_key
-from backend.people.errors import NoSuchPerson
-from backend.people.identity import Identity
-from backend.people.records import REMEMBERED, Account, LoginSession, Records, Token
-from backend.people.rights import MOVING, RIGHTS, Role
+from backend.foundation.people.credentials import digest, name_key
+from backend.foundation.people.errors import NoSuchPerson
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.records import REMEMBERED, Account, LoginSession, Records, Token
+from backend.foundation.people.rights import MOVING, RIGHTS, Role
 from drivers.errors import NotAllowed
 
 _WRITE_USE = timedelta(minutes=1)

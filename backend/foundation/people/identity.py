@@ -6,7 +6,7 @@ from contextvars import Context, ContextVar, copy_context
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.people.rights import RIGHTS, Right, Role
+from backend.foundation.people.rights import RIGHTS, Right, Role
 
 Kind = Literal["local", "session", "token", "guest"]
 

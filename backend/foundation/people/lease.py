@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from backend.people.elapsed import elapsed_s
+from backend.foundation.people.elapsed import elapsed_s
 from drivers.errors import Busy, NotAllowed
 
 #: A request that the holder does not answer passes control on after this

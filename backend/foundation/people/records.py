@@ -7,9 +7,9 @@ from datetime import datetime, timedelta
 
 from sqlalchemy import select
 
-from backend.people.rights import Right, Role
-from backend.people.tables import AccountRow, SessionRow, TokenRow
-from backend.store.database import Store
+from backend.foundation.people.rights import Right, Role
+from backend.foundation.people.tables import AccountRow, SessionRow, TokenRow
+from backend.foundation.store.database import Store
 
 #: A session ends this long after its last use, at the latest this long after the log-in.
 IDLE = timedelta(hours=2)

@@ -41,7 +41,7 @@ class Role(StrEnum):
 
 _OPERATOR = frozenset(Right) - {Right.ADMINISTER}
 
-#: A guest may look; more only by a grant of the person on site (see `backend.people.support`).
+#: A guest may look; more only by a grant of the person on site (see `support`).
 RIGHTS: dict[Role, frozenset[Right]] = {
     Role.VIEWER: frozenset({Right.LOOK}),
     Role.OPERATOR: _OPERATOR,

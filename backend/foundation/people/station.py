@@ -9,18 +9,18 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.people.accounts import Accounts
-from backend.people.elapsed import moment_of
-from backend.people.errors import NotLoggedIn
-from backend.people.identity import LOCAL, Identity
-from backend.people.login.devices import KnownDevices
-from backend.people.login.marker import AccountsMarker
-from backend.people.passwords import Passwords
-from backend.people.records import Account, LoginSession
-from backend.people.rights import RIGHTS
-from backend.people.support import Support
-from backend.store.database import Store
-from backend.store.files import StorageFailed
+from backend.foundation.people.accounts import Accounts
+from backend.foundation.people.elapsed import moment_of
+from backend.foundation.people.errors import NotLoggedIn
+from backend.foundation.people.identity import LOCAL, Identity
+from backend.foundation.people.login.devices import KnownDevices
+from backend.foundation.people.login.marker import AccountsMarker
+from backend.foundation.people.passwords import Passwords
+from backend.foundation.people.records import Account, LoginSession
+from backend.foundation.people.rights import RIGHTS
+from backend.foundation.people.support import Support
+from backend.foundation.store.database import Store
+from backend.foundation.store.files import StorageFailed
 from drivers.errors import NotAllowed
 
 log = logging.getLogger(__name__)

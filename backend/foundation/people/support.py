@@ -14,12 +14,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.people.credentials import checked_person, digest, new_secret, same_code, spoken_code
-from backend.people.elapsed import elapsed_s
-from backend.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
-from backend.people.identity import Identity
-from backend.people.rights import GRANTABLE, MOVING, RIGHTS, Right, Role, right_text, rights_text
-from backend.people.throttle import Throttle
+from backend.foundation.people.credentials import (
+    checked_person,
+    digest,
+    new_secret,
+    same_code,
+    spoken_code,
+)
+from backend.foundation.people.elapsed import elapsed_s
+from backend.foundation.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.rights import (
+    GRANTABLE,
+    MOVING,
+    RIGHTS,
+    Right,
+    Role,
+    right_text,
+    rights_text,
+)
+from backend.foundation.people.throttle import Throttle
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import Text, text

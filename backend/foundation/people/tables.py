@@ -11,7 +11,7 @@ from datetime import datetime
 from sqlalchemy import ForeignKey, Integer, String
 from sqlalchemy.orm import Mapped, mapped_column
 
-from backend.store.base import Base, UtcDateTime
+from backend.foundation.store.base import Base, UtcDateTime
 
 
 class AccountRow(Base):

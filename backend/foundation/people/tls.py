@@ -23,7 +23,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 
 #: Longest lifetime that phones accept, also from an authority that their user has installed.

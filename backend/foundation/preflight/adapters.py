@@ -1,7 +1,7 @@
 """The latency timer of a serial adapter: what it costs, lowered on request, and restored.
 
 The earlier value is on the disk before anything is changed (``latency-timers.json`` in the state
-folder). Unlike the settings of `backend.preflight.fixes`, the system keeps this one over a restart.
+folder). Unlike the settings of `fixes`, the system keeps this one over a restart.
 
 Reads per second are measured where a bus was open at the adapter. Otherwise they are a bound from
 the timer alone: reads that follow one another take at least one timer each (FTDI AN232B-04); the
@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.computer.latency_timer import LATENCY_MS, InForce, LatencyTimer, LatencyTimers
 from drivers.errors import Busy, DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import text

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from backend.preflight.findings import Fix
+from backend.foundation.preflight.findings import Fix
 from drivers.computer.host_facts import HostFacts
 from drivers.computer.host_settings import HostSettings, Setting, affinity, command
 from drivers.errors import NotAllowed

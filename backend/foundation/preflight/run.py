@@ -7,8 +7,8 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from backend.preflight.findings import Finding, findings
-from backend.preflight.verdicts import PERIODS_US, Verdict, verdicts
+from backend.foundation.preflight.findings import Finding, findings
+from backend.foundation.preflight.verdicts import PERIODS_US, Verdict, verdicts
 from drivers.adapters import require_interface
 from drivers.computer.host_facts import Computer, HostFacts
 from drivers.computer.lateness import Measured, from_json

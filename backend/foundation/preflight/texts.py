@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from backend.preflight.findings import Code, Finding, Fix
-from backend.preflight.verdicts import Grade, Purpose, Verdict
+from backend.foundation.preflight.findings import Code, Finding, Fix
+from backend.foundation.preflight.verdicts import Grade, Purpose, Verdict
 
 Language = Literal["en", "zh"]
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from backend.preflight.findings import Code, Effect, Finding
+from backend.foundation.preflight.findings import Code, Effect, Finding
 from drivers.computer.lateness import Measured, missed_bound
 
 

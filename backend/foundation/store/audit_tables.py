@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlalchemy import BigInteger, Integer, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from backend.store.base import Base
+from backend.foundation.store.base import Base
 
 #: SQLite accepts only INTEGER as a row number.
 _NUMBER = BigInteger().with_variant(Integer, "sqlite")

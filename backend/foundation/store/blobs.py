@@ -16,7 +16,7 @@ from pathlib import Path
 import fsspec
 from fsspec.implementations.local import LocalFileSystem
 
-from backend.store.files import StorageFailed, write_atomically
+from backend.foundation.store.files import StorageFailed, write_atomically
 from drivers.texts.message import text
 
 _NAME = re.compile(r"^[0-9a-f]{64}$")

@@ -25,8 +25,8 @@ from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from backend.store import migrate
-from backend.store.files import StorageFailed
+from backend.foundation.store import migrate
+from backend.foundation.store.files import StorageFailed
 from drivers.texts.message import Text
 from drivers.texts.message import text as message
 

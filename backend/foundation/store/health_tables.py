@@ -11,7 +11,7 @@ from datetime import datetime
 from sqlalchemy import JSON, BigInteger, Index, Integer, String, Text
 from sqlalchemy.orm import Mapped, mapped_column
 
-from backend.store.base import Base, UtcDateTime
+from backend.foundation.store.base import Base, UtcDateTime
 
 
 class HealthRun(Base):

@@ -16,7 +16,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
-from backend.store.base import Base, UtcDateTime
+from backend.foundation.store.base import Base, UtcDateTime
 
 
 class Item(Base):

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import backend
-from backend.store.files import write_atomically
-from backend.store.lock import FolderLock
+from backend.foundation.store.files import write_atomically
+from backend.foundation.store.lock import FolderLock
 from drivers.errors import NotAllowed
 
 FILE = "state.json"
@@ -82,7 +82,7 @@ def check(folder: Path) -> StateVersion | None:
     found = read(folder)
     if found is None:
         return None
-    from backend.store import migrate  # not needed by commands without a database
+    from backend.foundation.store import migrate  # not needed by commands without a database
 
     unknown = found.revisions - migrate.known_revisions()
     if found.version > VERSION or unknown:
@@ -108,7 +108,7 @@ def bring_up_to_date(folder: Path) -> bool:
         StorageFailed: the folder cannot be written; it has the version that was recorded last.
     """
     found = check(folder)
-    from backend.store import migrate  # not needed by commands without a database
+    from backend.foundation.store import migrate  # not needed by commands without a database
 
     revisions = migrate.known_revisions()
     wanted = StateVersion(VERSION, backend.__version__, revisions)

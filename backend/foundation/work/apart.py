@@ -53,7 +53,7 @@ async def read_apart(
     async with _at_once.setdefault(loop, asyncio.Semaphore(AT_ONCE)):
         task = (work, arguments, named)
         try:
-            answer = await answer_of("backend.work.apart", task=task, limit_s=LIMIT_S)
+            answer = await answer_of("backend.foundation.work.apart", task=task, limit_s=LIMIT_S)
         except TimeoutError:
             raise ReadingEnded("work.reading-time", limit_s=LIMIT_S) from None
     result: T

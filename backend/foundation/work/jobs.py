@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Literal
 
-from backend.people.identity import Actor, acting, acting_person
+from backend.foundation.people.identity import Actor, acting, acting_person
 from drivers.errors import Busy, DriveError
 from drivers.texts.message import Text, as_text, prose, text
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.people.identity import acting_person
+from backend.foundation.people.identity import acting_person
 from drivers.texts.message import Text
 
 Level = Literal["info", "warning", "error"]

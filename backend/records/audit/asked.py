@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
 
-from backend.audit.facts import Value
+from backend.records.audit.facts import Value
 
 #: Largest body that is recorded; larger ones are files, whose names are in the path.
 MOST_BYTES = 8192

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from sqlalchemy import insert, select
 from sqlalchemy.orm import Session
 
-from backend.store.audit_tables import AuditEntry, AuditHead
+from backend.foundation.store.audit_tables import AuditEntry, AuditHead
 from drivers.texts.message import Text, text
 
 #: Value used as the hash before the first entry.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 
-from backend.audit.chain import ZERO, Anchor, Verdict, columns, verify
-from backend.store.audit_tables import AuditEntry
+from backend.foundation.store.audit_tables import AuditEntry
+from backend.records.audit.chain import ZERO, Anchor, Verdict, columns, verify
 from drivers.errors import NotAllowed
 
 

@@ -22,12 +22,12 @@ from itertools import islice
 
 from sqlalchemy import select
 
-from backend.audit import chain
-from backend.audit.facts import Fact, body_of, stamp
-from backend.audit.pending import PendingFile
-from backend.people.identity import acting_person
-from backend.store.audit_tables import AuditEntry
-from backend.store.database import DatabaseFailed, Store
+from backend.foundation.people.identity import acting_person
+from backend.foundation.store.audit_tables import AuditEntry
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.records.audit import chain
+from backend.records.audit.facts import Fact, body_of, stamp
+from backend.records.audit.pending import PendingFile
 from drivers.errors import internal_error
 from drivers.texts.message import Text, text
 

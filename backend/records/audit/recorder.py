@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from backend.audit.asked import settings_now
-from backend.audit.facts import Action, Fact, Kind, Value
-from backend.audit.log import AuditLog
-from backend.drive.readings import CommandRecord, Refusal, WriteRecord
-from backend.people.lease import Holder
-from backend.work.jobs import Job
+from backend.axes.drive.readings import CommandRecord, Refusal, WriteRecord
+from backend.foundation.people.lease import Holder
+from backend.foundation.work.jobs import Job
+from backend.records.audit.asked import settings_now
+from backend.records.audit.facts import Action, Fact, Kind, Value
+from backend.records.audit.log import AuditLog
 from drivers.errors import why_of
 from drivers.texts.answers import message_in
 from drivers.texts.message import Text, text

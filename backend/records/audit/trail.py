@@ -13,11 +13,11 @@ from typing import Any, Literal
 from sqlalchemy import Select, select
 from sqlalchemy.orm import Session
 
-from backend.audit.chain import Anchor, Verdict, verify
-from backend.audit.facts import Kind, Value, stamp
-from backend.store.audit_tables import AuditEntry, AuditHead
-from backend.store.database import Store
-from backend.store.spreadsheet import as_text
+from backend.foundation.store.audit_tables import AuditEntry, AuditHead
+from backend.foundation.store.database import Store
+from backend.foundation.store.spreadsheet import as_text
+from backend.records.audit.chain import Anchor, Verdict, verify
+from backend.records.audit.facts import Kind, Value, stamp
 from drivers.texts.message import Language, Text, prose
 
 Format = Literal["csv", "jsonl"]

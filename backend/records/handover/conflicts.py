@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Literal, Protocol
 
-from backend.handover.listed import ControllerList, Listed
-from backend.handover.model import (
+from backend.axes.motion.classes import motion_of
+from backend.records.handover.listed import ControllerList, Listed
+from backend.records.handover.model import (
     Consequence,
     StartupWrite,
     Transition,
@@ -17,7 +18,6 @@ from backend.handover.model import (
     rank,
     write_of,
 )
-from backend.motion.classes import motion_of
 from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
 from drivers.texts.message import Param, Text, text

@@ -11,7 +11,7 @@ import struct
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
-from backend.handover.eni_registers import (
+from backend.records.handover.eni_registers import (
     ADDRESS,
     AL_STATUS,
     FMMU,
@@ -21,8 +21,8 @@ from backend.handover.eni_registers import (
     register_command,
     slave_registers,
 )
-from backend.handover.model import AxisHandover, MappedEntry, MappedPdo
-from backend.handover.xml_lists import child, file_of, init_command, init_commands, note
+from backend.records.handover.model import AxisHandover, MappedEntry, MappedPdo
+from backend.records.handover.xml_lists import child, file_of, init_command, init_commands, note
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from profiles.importer.esi_controller import SlaveController

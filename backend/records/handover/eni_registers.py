@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from backend.handover.model import AxisHandover
-from backend.handover.xml_lists import child
+from backend.records.handover.model import AxisHandover
+from backend.records.handover.xml_lists import child
 from profiles.importer.esi_controller import SlaveController, SyncManager
 
 #: Datagram commands (ETG.1000.4 clause 5.4).

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from backend.parameters.set_file import BadSet
+from backend.axes.parameters.set_file import BadSet
 from drivers.errors import NotAllowed
 from drivers.texts.imports import failure_text, message_of_import
 from drivers.texts.message import Text

@@ -8,9 +8,9 @@ from dataclasses import replace
 from datetime import datetime
 from typing import Literal, get_args
 
-from backend.handover import ros2_files, text_lists, xml_lists
-from backend.handover.eni import eni, is_complete
-from backend.handover.model import AxisHandover
+from backend.records.handover import ros2_files, text_lists, xml_lists
+from backend.records.handover.eni import eni, is_complete
+from backend.records.handover.model import AxisHandover
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 from profiles.importer.esi_controller import SlaveController, Wanted

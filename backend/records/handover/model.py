@@ -9,8 +9,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.motion.classes import motion_of
-from backend.parameters.set_file import ParameterSet
+from backend.axes.motion.classes import motion_of
+from backend.axes.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, joined, prose, text

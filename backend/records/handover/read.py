@@ -18,8 +18,9 @@ import yaml
 from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
-from backend.handover import read_text
-from backend.handover.listed import (
+from backend.axes.parameters.set_file import BadSet
+from backend.records.handover import read_text
+from backend.records.handover.listed import (
     BadRow,
     ControllerList,
     Listed,
@@ -30,7 +31,6 @@ from backend.handover.listed import (
     number,
     row_of_bytes,
 )
-from backend.parameters.set_file import BadSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError
 from drivers.texts.imports import failure_text

@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from backend.handover.listed import (
+from backend.records.handover.listed import (
     BadRow,
     Listed,
     chosen,

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
-from backend.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed
 from profiles.schema import Raw
 
 _UNSAFE = re.compile(r"[^\w.\-]")

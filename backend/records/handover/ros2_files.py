@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from xml.sax.saxutils import escape
 
-from backend.handover.model import AxisHandover, LeftOut, MappedEntry, StartupWrite
-from backend.handover.text_lists import line_of, number_type
+from backend.records.handover.model import AxisHandover, LeftOut, MappedEntry, StartupWrite
+from backend.records.handover.text_lists import line_of, number_type
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 

@@ -7,8 +7,8 @@ import io
 import struct
 from datetime import UTC, datetime
 
-from backend.handover.model import AxisHandover, StartupWrite
-from backend.store.spreadsheet import as_text
+from backend.foundation.store.spreadsheet import as_text
+from backend.records.handover.model import AxisHandover, StartupWrite
 from profiles.importer import export_dcf
 from profiles.schema import Parameter, Raw
 

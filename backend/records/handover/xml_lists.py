@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 from xml.etree.ElementTree import Comment, Element, SubElement, indent, tostring
 
-from backend.handover.model import AxisHandover, MappedEntry, StartupWrite
+from backend.records.handover.model import AxisHandover, MappedEntry, StartupWrite
 
 #: Download request of CoE (ETG.2100 table of InitCmd: Ccs 1 is an SDO download).
 _CCS_DOWNLOAD = 1

@@ -14,10 +14,14 @@ from sqlalchemy import Select, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, selectinload
 
-from backend.audit.facts import Action, Value
-from backend.audit.facts import Fact as AuditFact
-from backend.library import rows
-from backend.library.entries import (
+from backend.foundation.store.blobs import BlobFailed, Blobs
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.foundation.store.library_tables import Content, Item, Tag
+from backend.foundation.store.library_tables import Version as VersionRow
+from backend.records.audit.facts import Action, Value
+from backend.records.audit.facts import Fact as AuditFact
+from backend.records.library import rows
+from backend.records.library.entries import (
     MAX_NOTES,
     MAX_TAG,
     MAX_TAGS,
@@ -27,10 +31,6 @@ from backend.library.entries import (
     Query,
     Version,
 )
-from backend.store.blobs import BlobFailed, Blobs
-from backend.store.database import DatabaseFailed, Store
-from backend.store.library_tables import Content, Item, Tag
-from backend.store.library_tables import Version as VersionRow
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import text
@@ -49,7 +49,7 @@ class NotInLibrary(NotAllowed):
 
 
 class Library:
-    """The library of a store. ``record`` is called with every change (see backend.audit)."""
+    """The library of a store. ``record`` is called with every change (see `audit`)."""
 
     def __init__(
         self,

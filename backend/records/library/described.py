@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.library import measurements
-from backend.library.entries import Addition, AxisIdentity, Kind
-from backend.library.index import Described, Folder
-from backend.recording.chunks import SUFFIX as RECORDING
-from backend.recording.library import RecordingLibrary
-from backend.recording.reader import RecordingReader
+from backend.records.library import measurements
+from backend.records.library.entries import Addition, AxisIdentity, Kind
+from backend.records.library.index import Described, Folder
+from backend.records.recording.chunks import SUFFIX as RECORDING
+from backend.records.recording.library import RecordingLibrary
+from backend.records.recording.reader import RecordingReader
 from drivers.texts.answers import sentence
 
 _REPORT = re.compile(r"^\d{8}-\d{6}-report-(?P<axis>.+?)(-\d+)?\.\w+$")

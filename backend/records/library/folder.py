@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import SUFFIX, ParameterSet
-from backend.store.files import checked_name, new_name, write_atomically
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import SUFFIX, ParameterSet
+from backend.foundation.store.files import checked_name, new_name, write_atomically
 from drivers.errors import NotAllowed
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.drive.drive import Drive
-from backend.parameters.set_file import ParameterSet
+from backend.axes.drive.drive import Drive
+from backend.axes.parameters.set_file import ParameterSet
 from drivers.texts.message import Text, text
 
 What = Literal["vendor", "product", "serial", "revision", "firmware"]

@@ -16,11 +16,11 @@ from pathlib import Path
 from sqlalchemy import select
 from sqlalchemy.orm import selectinload
 
-from backend.library import rows
-from backend.library.entries import Addition, Kind
-from backend.store.database import Store
-from backend.store.files import files_of, shown_name
-from backend.store.library_tables import Item, Tag
+from backend.foundation.store.database import Store
+from backend.foundation.store.files import files_of, shown_name
+from backend.foundation.store.library_tables import Item, Tag
+from backend.records.library import rows
+from backend.records.library.entries import Addition, Kind
 from drivers.errors import NotAllowed
 from drivers.texts.answers import sentence
 

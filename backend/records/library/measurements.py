@@ -23,8 +23,8 @@ import numpy as np
 import numpy.typing as npt
 
 import backend
-from backend.drive.drive import Drive
-from backend.store.files import checked_name, files_of, shown_name, write_atomically
+from backend.axes.drive.drive import Drive
+from backend.foundation.store.files import checked_name, files_of, shown_name, write_atomically
 from drivers.errors import NotAllowed
 from profiles.schema import Profile
 

@@ -7,10 +7,10 @@ from typing import cast
 
 from sqlalchemy import Select, and_, exists, select
 
-from backend.audit.trail import like
-from backend.library.entries import Addition, AxisIdentity, Entry, Kind, Query, Version
-from backend.store.library_tables import Item, Tag
-from backend.store.library_tables import Version as VersionRow
+from backend.foundation.store.library_tables import Item, Tag
+from backend.foundation.store.library_tables import Version as VersionRow
+from backend.records.audit.trail import like
+from backend.records.library.entries import Addition, AxisIdentity, Entry, Kind, Query, Version
 
 
 def entry(item: Item) -> Entry:

@@ -6,11 +6,17 @@ from collections.abc import Sequence
 from datetime import UTC
 from pathlib import Path
 
-from backend.library.catalogue import Library
-from backend.library.entries import Addition, AxisIdentity, Entry
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import SUFFIX, BadSet, ParameterSet
-from backend.store.files import StorageFailed, checked_name, files_of, new_name, shown_name
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import SUFFIX, BadSet, ParameterSet
+from backend.foundation.store.files import (
+    StorageFailed,
+    checked_name,
+    files_of,
+    new_name,
+    shown_name,
+)
+from backend.records.library.catalogue import Library
+from backend.records.library.entries import Addition, AxisIdentity, Entry
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from backend.library.catalogue import Library
-from backend.library.described import require_usable
-from backend.library.entries import Addition, Entry
-from backend.library.index import Index
-from backend.store.files import StorageFailed, write_atomically
+from backend.foundation.store.files import StorageFailed, write_atomically
+from backend.records.library.catalogue import Library
+from backend.records.library.described import require_usable
+from backend.records.library.entries import Addition, Entry
+from backend.records.library.index import Index
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 

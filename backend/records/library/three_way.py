@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.parameters.set_file import Row, compare
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters.set_file import Row, compare
 from drivers.texts.message import Text
 from profiles.schema import Parameter, Raw
 

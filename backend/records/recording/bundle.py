@@ -15,13 +15,13 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from backend.recording import chunks
-from backend.recording.bundle_page import drawings_of, log_line, page, when
-from backend.recording.evidence import Evidence, Value
-from backend.recording.export import NICE, to_csv
-from backend.recording.reader import RecordingReader
-from backend.store.files import StorageFailed
-from backend.store.spreadsheet import as_text
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.spreadsheet import as_text
+from backend.records.recording import chunks
+from backend.records.recording.bundle_page import drawings_of, log_line, page, when
+from backend.records.recording.evidence import Evidence, Value
+from backend.records.recording.export import NICE, to_csv
+from backend.records.recording.reader import RecordingReader
 from drivers.computer.processes import yield_processor
 from profiles.replacing import move_into_place
 
@@ -38,7 +38,7 @@ async def build_apart(evidence: Evidence, target: Path) -> None:
     process = await asyncio.create_subprocess_exec(
         sys.executable,
         "-m",
-        "backend.recording.bundle",
+        "backend.records.recording.bundle",
         str(target),
         stdin=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.PIPE,

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from backend.recording.evidence import Evidence
-from backend.recording.export import shown
-from backend.recording.reader import RecordingReader
-from backend.recording.table import merged
-from backend.work.journal import Entry
+from backend.foundation.work.journal import Entry
+from backend.records.recording.evidence import Evidence
+from backend.records.recording.export import shown
+from backend.records.recording.reader import RecordingReader
+from backend.records.recording.table import merged
 
 PLOT_WIDTH, PLOT_HEIGHT = 900, 120
 #: Smallest number of points of a curve, and largest number of curves on the page.

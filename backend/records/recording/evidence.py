@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from backend.work.journal import Entry
+from backend.foundation.work.journal import Entry
 from drivers.link import ScopeBlock
 
 

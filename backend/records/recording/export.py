@@ -1,6 +1,6 @@
 """Exports of a recording: CSV, rerun's .rrd, MCAP. Run as a separate process.
 
-    python -m backend.recording.export FILE.sdrec OUT (csv|csv_raw|rrd|mcap)
+    python -m backend.records.recording.export FILE.sdrec OUT (csv|csv_raw|rrd|mcap)
 
 Prints the completed fraction, one number a line. ``csv`` and ``rrd`` are in the units that the
 scope shows; ``csv_raw`` and ``mcap`` contain the values as recorded. Times are exact to a
@@ -20,9 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from backend.recording.reader import Channel, RecordingReader
-from backend.recording.table import merged
-from backend.store.spreadsheet import as_text
+from backend.foundation.store.spreadsheet import as_text
+from backend.records.recording.reader import Channel, RecordingReader
+from backend.records.recording.table import merged
 from drivers.computer.processes import yield_processor
 from profiles.replacing import move_into_place
 
@@ -172,7 +172,7 @@ def to_rrd(reader: RecordingReader, path: Path, progress: Progress) -> None:
     """Write a .rrd file: one entity for each drive and unit, a text log of events, the layout."""
     import rerun as rr
 
-    from backend.recording import rerun_layout
+    from backend.records.recording import rerun_layout
 
     total = max(1, reader.summary().samples)
     arranged = rerun_layout.plots(reader.channels)

@@ -10,15 +10,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from backend.recording.chunks import SUFFIX
-from backend.recording.reader import BadRecording, RecordingReader, Summary
-from backend.store.files import (
+from backend.foundation.store.files import (
     checked_name,
     files_of,
     new_name,
     shown_name,
     write_atomically,
 )
+from backend.records.recording.chunks import SUFFIX
+from backend.records.recording.reader import BadRecording, RecordingReader, Summary
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text
 

@@ -10,8 +10,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
-from backend.recording import chunks
-from backend.recording.chunks import Samples
+from backend.records.recording import chunks
+from backend.records.recording.chunks import Samples
 from drivers.errors import NotAllowed
 from drivers.texts.answers import message_in, sentence
 from drivers.texts.message import Text, text

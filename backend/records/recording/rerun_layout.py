@@ -15,7 +15,7 @@ import numpy.typing as npt
 import rerun as rr
 import rerun.blueprint as rrb
 
-from backend.recording.reader import Channel
+from backend.records.recording.reader import Channel
 
 APPLICATION = "servodeck"
 TIMELINE = "time"

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.recording.chunks import Samples
-from backend.recording.reader import BlockRef, RecordingReader
+from backend.records.recording.chunks import Samples
+from backend.records.recording.reader import BlockRef, RecordingReader
 
 WINDOW_S = 1.0
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
-from backend.recording import chunks
-from backend.store.files import StorageFailed
-from backend.store.free_space import RESERVE_BYTES, free_bytes
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.free_space import RESERVE_BYTES, free_bytes
+from backend.records.recording import chunks
 from drivers.computer.files import write_parts
 from drivers.link import ScopeBlock
 from drivers.texts import limits

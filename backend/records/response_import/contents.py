@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.signals.arrays import FloatArray
-from backend.response_import.errors import BadRecording
-from backend.response_import.matlab import read_matlab
+from backend.records.response_import.errors import BadRecording
+from backend.records.response_import.matlab import read_matlab
 from drivers.texts import limits
 from drivers.texts.message import text as message
 

@@ -22,10 +22,10 @@ from backend.analysis.response.collocated import (
 )
 from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
 from backend.analysis.signals.arrays import FloatArray
-from backend.response_import.contents import Table, read_table
-from backend.response_import.errors import BadRecording
-from backend.response_import.signals import Signals, signals_of
-from backend.response_import.units import Scale, scale_of
+from backend.records.response_import.contents import Table, read_table
+from backend.records.response_import.errors import BadRecording
+from backend.records.response_import.signals import Signals, signals_of
+from backend.records.response_import.units import Scale, scale_of
 from drivers.texts import limits
 from drivers.texts.answers import sentences
 from drivers.texts.message import Text, text

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.signals.arrays import FloatArray
-from backend.response_import.errors import BadRecording
+from backend.records.response_import.errors import BadRecording
 from drivers.texts import limits
 from drivers.texts.message import text
 

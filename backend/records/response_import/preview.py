@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.response_import.contents import read_table
-from backend.response_import.signals import unit_in
+from backend.records.response_import.contents import read_table
+from backend.records.response_import.signals import unit_in
 
 _FIRST_VALUES, _SHOWN_COLUMNS, _CURVE = 6, 64, 400
 

@@ -1,4 +1,4 @@
-"""Imports in a separate process: ``python -m backend.response_import.process``.
+"""Imports in a separate process: ``python -m backend.records.response_import.process``.
 
 A file from elsewhere may take seconds and much memory, and its contents are not known. In its own
 process the import does not delay motion, and its caller can end it. One pickled task comes from
@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from backend.response_import.contents import read_table
-from backend.response_import.errors import BadRecording
-from backend.response_import.evaluation import ImportSettings, evaluate_signals, prepared
-from backend.response_import.preview import preview
-from backend.response_import.stored import pack_import
-from backend.work.apart import answer_of
+from backend.foundation.work.apart import answer_of
+from backend.records.response_import.contents import read_table
+from backend.records.response_import.errors import BadRecording
+from backend.records.response_import.evaluation import ImportSettings, evaluate_signals, prepared
+from backend.records.response_import.preview import preview
+from backend.records.response_import.stored import pack_import
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.texts.message import Text, prose, text
 
@@ -56,7 +56,9 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
         BadRecording: the file is not usable, or its evaluation takes too long.
     """
     try:
-        given = await answer_of("backend.response_import.process", task=task, limit_s=limit_s)
+        given = await answer_of(
+            "backend.records.response_import.process", task=task, limit_s=limit_s
+        )
     except TimeoutError:
         raise BadRecording(
             "import.evaluation-ended-after",

@@ -9,8 +9,8 @@ import numpy as np
 
 from backend.analysis.response.foreign import LEAST_SAMPLES
 from backend.analysis.signals.arrays import FloatArray
-from backend.response_import.contents import Table
-from backend.response_import.errors import BadRecording
+from backend.records.response_import.contents import Table
+from backend.records.response_import.errors import BadRecording
 from drivers.texts import limits
 from drivers.texts.message import Text, text
 

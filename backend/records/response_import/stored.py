@@ -9,9 +9,9 @@ from datetime import datetime
 import numpy as np
 import numpy.typing as npt
 
-from backend.library.measurements import pack_other
-from backend.response_import.evaluation import ImportSettings, evaluate_signals
-from backend.response_import.signals import Signals
+from backend.records.library.measurements import pack_other
+from backend.records.response_import.evaluation import ImportSettings, evaluate_signals
+from backend.records.response_import.signals import Signals
 
 KIND = "imported-response"
 TOOL = "response-import"

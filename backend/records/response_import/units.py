@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import pi
 from typing import Literal
 
-from backend.response_import.errors import BadRecording
+from backend.records.response_import.errors import BadRecording
 from drivers.texts import limits
 from drivers.texts.message import text
 

@@ -14,18 +14,18 @@ from functools import partial
 from pathlib import Path
 
 from backend import __version__
-from backend.axis.cyclic import INPUT_ROLES, OUTPUT_ROLES
-from backend.drive.readings import Reading
-from backend.recording.bundle import build_apart
-from backend.recording.evidence import Evidence, Value
-from backend.recording.flight import flights
-from backend.scope.hub import Subscription
+from backend.axes.axis.cyclic import INPUT_ROLES, OUTPUT_ROLES
+from backend.axes.drive.readings import Reading
+from backend.axes.scope.hub import Subscription
+from backend.foundation.store.files import StorageFailed, checked_name
+from backend.foundation.store.free_space import RESERVE_BYTES, free_bytes
+from backend.records.recording.bundle import build_apart
+from backend.records.recording.evidence import Evidence, Value
+from backend.records.recording.flight import flights
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
 from backend.station.recording import facts
 from backend.station.recording.streams import describe_streams
-from backend.store.files import StorageFailed, checked_name
-from backend.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import DriveError, NotAllowed, why_of
 from drivers.link import ScopeBlock
 from drivers.texts import limits

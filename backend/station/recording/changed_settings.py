@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from backend.axis.cyclic import OUTPUT_ROLES
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
+from backend.axes.axis.cyclic import OUTPUT_ROLES
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
 from backend.station.bench import Bench
 from drivers.texts.message import Text, text
 

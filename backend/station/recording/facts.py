@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from backend.axis.fault_history import PastFault, history_of, read_history
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.parameters import set_file as parameter_set
+from backend.axes.axis.fault_history import PastFault, history_of, read_history
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters import set_file as parameter_set
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import DriveError

@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from backend import __version__
-from backend.recording.writer import RecordingWriter, Written
-from backend.scope.hub import Subscription
+from backend.axes.scope.hub import Subscription
+from backend.foundation.store.files import StorageFailed
+from backend.records.recording.writer import RecordingWriter, Written
 from backend.station.bench import Bench
 from backend.station.recording import facts
 from backend.station.recording.streams import describe_streams
-from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed, OutOfRange, with_remedy
 from drivers.link import ScopeBlock
 from drivers.texts.message import Text, text

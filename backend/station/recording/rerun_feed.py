@@ -14,20 +14,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from backend.drive.readings import Reading
-from backend.recording.reader import Channel
-from backend.scope.hub import Subscription
+from backend.axes.drive.readings import Reading
+from backend.axes.scope.hub import Subscription
+from backend.foundation.work.journal import Entry
+from backend.records.recording.reader import Channel
 from backend.station.bench import Bench
 from backend.station.recording.changed_settings import ChangedSettings
 from backend.station.recording.streams import describe_streams
-from backend.work.journal import Entry
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock
 
 if TYPE_CHECKING:
     import rerun as rr
 
-    from backend.recording.rerun_layout import Plot
+    from backend.records.recording.rerun_layout import Plot
 
 #: Period of the chunks [s]: shorter ones load the viewer, longer ones look jerky.
 PERIOD_S = 0.05
@@ -155,7 +155,7 @@ class RerunFeed:
     # --- the feed ---------------------------------------------------------------------
 
     async def _run(self) -> None:
-        from backend.recording import rerun_layout  # takes most of a second the first time
+        from backend.records.recording import rerun_layout  # takes most of a second the first time
 
         try:
             while True:
@@ -227,7 +227,7 @@ class RerunFeed:
     def _open(self, plots: list[Plot]) -> tuple[rr.RecordingStream, rr.BinaryStream]:
         import rerun as rr
 
-        from backend.recording import rerun_layout
+        from backend.records.recording import rerun_layout
 
         self._session = next(self._numbers)
         recording = rr.RecordingStream(
@@ -248,7 +248,7 @@ def _encode(
     events: list[Entry],
 ) -> bytes:
     """Encode one chunk for each plot with all samples since the last call."""
-    from backend.recording import rerun_layout
+    from backend.records.recording import rerun_layout
 
     offset_ns = time.time_ns() - time.monotonic_ns()
     for number in dict.fromkeys(n for n, _ in blocks):

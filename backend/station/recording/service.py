@@ -9,16 +9,16 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.drive.readings import Reading
-from backend.recording.library import RecordingLibrary
+from backend.axes.drive.readings import Reading
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.free_space import free_bytes
+from backend.foundation.work.jobs import Job, JobResult, Progress
+from backend.foundation.work.journal import Entry
+from backend.records.recording.library import RecordingLibrary
 from backend.station.bench import Bench
 from backend.station.recording.capture import FaultCapture
 from backend.station.recording.changed_settings import ChangedSettings
 from backend.station.recording.recorder import EndReason, Recorder, Settings
-from backend.store.files import StorageFailed
-from backend.store.free_space import free_bytes
-from backend.work.jobs import Job, JobResult, Progress
-from backend.work.journal import Entry
 from drivers.errors import Busy, NotAllowed
 from drivers.texts.message import Text, text
 
@@ -237,7 +237,7 @@ async def run_export(source: Path, target: Path, kind: str, progress: Progress) 
         StorageFailed: it failed; the message contains the last line of its output.
     """
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "backend.recording.export", str(source), str(target), kind,
+        sys.executable, "-m", "backend.records.recording.export", str(source), str(target), kind,
         stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip
     assert process.stdout is not None

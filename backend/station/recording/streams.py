@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from backend.scope.units import axis_scale
+from backend.axes.scope.units import axis_scale
 from backend.station.bench import Bench
 
 

@@ -9,15 +9,15 @@ from datetime import UTC, datetime
 
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.candidates import plan
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.autotune.verify import HUM_PERCENT, Check, Keep, Verified, of_candidate, verify
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.tools.thresholds import autotune_apply as threshold
-from backend.work.jobs import Progress
 from drivers.errors import DriveError, OutOfRange
 from drivers.texts.message import Text, joined, text
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
 from drivers.errors import NotAllowed
 from profiles.schema import Parameter
 

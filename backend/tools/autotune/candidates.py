@@ -12,8 +12,8 @@ from backend.analysis.loop.loop_goals import LoadClass
 from backend.analysis.loop.loop_structure import DriveLoops
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.notch import effect as notch_effect

@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import si_value
 from backend.tools.measuring.interrupted import ends_all
@@ -23,7 +24,6 @@ from backend.tools.measuring.temporary import temporary
 from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
 from backend.tools.step.run import step_response
 from backend.tools.thresholds import autotune_gain_steps as threshold
-from backend.work.jobs import Progress
 from drivers.errors import DriveError
 from drivers.texts.message import text
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.loop.loop_structure import DriveLoops, Gains, LoopFilters
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from backend.tools.thresholds import autotune_gains as threshold
 from drivers.errors import NotAllowed, OutOfRange

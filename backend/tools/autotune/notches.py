@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.inertia import evaluation as inertia_evaluation
@@ -23,7 +24,6 @@ from backend.tools.notch.in_loop import measure_meaning_in_loop
 from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.thresholds import autotune_notches as threshold
-from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 

@@ -18,8 +18,9 @@ from backend.analysis.loop.loop_goals import Goals, stable_with_less_gain, worst
 from backend.analysis.loop.loop_structure import Gains, LoopFilters, speed_loop
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.loop.notch import Notch
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.apply import Applied, first_kept, nothing_stays, stages, take_back
 from backend.tools.autotune.axis_facts import AxisFacts
@@ -32,7 +33,6 @@ from backend.tools.notch import filters as notch_tool
 from backend.tools.notch.effect import unknown
 from backend.tools.notch.meaning import meaning_of
 from backend.tools.thresholds import autotune_present as threshold
-from backend.work.jobs import Progress
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
 

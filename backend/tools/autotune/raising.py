@@ -6,7 +6,7 @@ from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals
 from backend.analysis.loop.loop_verdict import WORST_DB, LoopVerdict, Missed, excluding_db
 from backend.analysis.loop.measured_plant import MeasuredPlant
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps
 from backend.tools.autotune.verdict import MARGIN_DB, in_words, loops_of, misses

@@ -14,8 +14,9 @@ from datetime import datetime
 from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import LoadClass, Mark, goals_for
 from backend.analysis.loop.loop_structure import Gains
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.again import Again, Designing, Figures, expected, first_that_holds
 from backend.tools.autotune.apply import part
@@ -42,7 +43,6 @@ from backend.tools.step import evaluate as step_evaluation
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.tools.thresholds import autotune_run as threshold
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed
 from drivers.texts.message import Text, joined, text

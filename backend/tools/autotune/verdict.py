@@ -14,7 +14,7 @@ from backend.analysis.response.frf import Frf
 from backend.analysis.response.reference_path import reference_paths
 from backend.analysis.response.sampling import Hold
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.tools.autotune import gains as gain_tool
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.notch import filters as notch_tool

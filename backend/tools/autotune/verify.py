@@ -16,8 +16,9 @@ from backend.analysis.loop.margins import bandwidth, open_from_closed
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.sampling import Hold
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
 from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
@@ -43,7 +44,6 @@ from backend.tools.step.run import step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.tools.thresholds import autotune_verify as threshold
-from backend.work.jobs import Progress
 from drivers.texts.message import Text, joined, prose, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]

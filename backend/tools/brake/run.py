@@ -18,10 +18,10 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import channel
-from backend.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
-from backend.scales.units import AxisUnits
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import channel
+from backend.axes.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
+from backend.axes.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, brake_opens_s, read_facts
 from backend.tools.brake.evaluate import PRELOAD, Phase, Trial, Trials, evaluate, reevaluate
 from backend.tools.brake.result import BrakeResult, Means, Obstacle

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from backend.motion.envelope import Envelope
+from backend.axes.motion.envelope import Envelope
 from backend.tools.tool import Option, ToolSettings
 
 

@@ -18,21 +18,11 @@ from backend.tools.cycle.result import (
     Verdict,
 )
 from backend.tools.cycle.settings import CycleSettings
+from backend.tools.thresholds import cycle_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]
-#: Minimum number of samples.
-_FEWEST = 20
-#: Below both, the axis is idle: % of rated torque, rpm.
-_IDLE_PERCENT, _IDLE_RPM = 0.5, 1.0
-#: A peak within this share of the limit is limited by it; a speed up to this factor of the rated
-#: speed is accepted.
-_AT_LIMIT, _OVER_SPEED = 0.98, 1.02
-#: Slower sampling misses short acceleration peaks.
-_SLOW_HZ = 50.0
-#: Cells of the cloud in each direction; one sample of each is shown.
-_CELLS = 40
 
 
 @dataclass(frozen=True)
@@ -97,16 +87,16 @@ def evaluate(samples: Samples, settings: CycleSettings, facts: CycleFacts) -> Cy
         NotAllowed: too few samples arrived.
     """
     signals = samples.signals
-    if signals.time_s.size < _FEWEST or signals.duration_s <= 0.0:
+    if signals.time_s.size < threshold.FEWEST or signals.duration_s <= 0.0:
         count = int(signals.time_s.size)
-        raise NotAllowed("cycle.too-few-samples", value=count, limit=str(_FEWEST))
+        raise NotAllowed("cycle.too-few-samples", value=count, limit=str(threshold.FEWEST))
     period = settings.period_s or load.period_of(signals)
     moments = load.whole_periods(signals, period)
     whole = period is not None and load.has_periods(signals, period)
     effective = load.effective_torque(signals, moments)
     peak = float(np.max(np.abs(signals.torque_percent)))
     fastest = float(np.max(np.abs(signals.speed_rpm)))
-    idle = effective.value < _IDLE_PERCENT and fastest < _IDLE_RPM
+    idle = effective.value < threshold.IDLE_PERCENT and fastest < threshold.IDLE_RPM
     warm = None if idle else _heat(signals, settings, facts, effective)
     budget = None if idle else _overload(signals, settings)
     power = None
@@ -192,21 +182,21 @@ def _findings(result: CycleResult, settings: CycleSettings) -> list[Finding]:
         found.append(Finding(code="no_period"))
     elif result.periods < 3:
         found.append(Finding(code="few_periods", value=result.periods))
-    if result.sample_rate_hz < _SLOW_HZ:
+    if result.sample_rate_hz < threshold.SLOW_HZ:
         found.append(Finding(code="slow_sampling", value=1e3 / result.sample_rate_hz, unit="ms"))
     if result.longest_gap_s > max(5.0 / result.sample_rate_hz, 0.25):
         found.append(Finding(code="gaps", value=result.longest_gap_s, unit="s"))
     limit = result.peak_limit_percent
     if limit is None:
         found.append(Finding(code="peak_unknown"))
-    elif result.peak_percent > limit / _AT_LIMIT:
+    elif result.peak_percent > limit / threshold.AT_LIMIT:
         found.append(Finding(code="peak_beyond", value=limit, unit="%"))
-    elif result.peak_percent > _AT_LIMIT * limit:
+    elif result.peak_percent > threshold.AT_LIMIT * limit:
         found.append(Finding(code="peak_reached", value=limit, unit="%"))
     rated = result.rated_speed_rpm
     if rated is None:
         found.append(Finding(code="rated_speed_unknown"))
-    elif result.highest_speed_rpm > _OVER_SPEED * rated:
+    elif result.highest_speed_rpm > threshold.OVER_SPEED * rated:
         found.append(Finding(code="speed_beyond_rated", value=rated, unit="rpm"))
     if result.rated_torque_nm is None:
         found.append(Finding(code="rated_torque_unknown"))
@@ -234,9 +224,9 @@ def _cloud(signals: Signals) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
     def cells(values: FloatArray) -> npt.NDArray[np.int64]:
         low, wide = float(np.min(values)), float(np.ptp(values))
-        return np.asarray((values - low) / (wide or 1.0) * (_CELLS - 1e-9), np.int64)
+        return np.asarray((values - low) / (wide or 1.0) * (threshold.CELLS - 1e-9), np.int64)
 
-    _, places = np.unique(cells(speed) * (_CELLS + 1) + cells(torque), return_index=True)
+    _, places = np.unique(cells(speed) * (threshold.CELLS + 1) + cells(torque), return_index=True)
     ends = [int(f(each)) for each in (speed, torque) for f in (np.argmin, np.argmax)]
     chosen = np.unique(np.concatenate([places, ends]))
     chosen = chosen[np.lexsort((torque[chosen], speed[chosen]))]

@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.duty.load import Signals
-from backend.axis.axis import Axis
-from backend.drive.optional import existing
-from backend.people.rights import Right
-from backend.recording.reader import RecordingReader
-from backend.scales.units import AxisUnits
-from backend.scope.hub import ScopeHub
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.optional import existing
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scope.hub import ScopeHub
+from backend.foundation.people.rights import Right
+from backend.records.recording.reader import RecordingReader
 from backend.tools.autotune.axis_facts import si
 from backend.tools.cycle.evaluate import (
     CycleFacts,
@@ -32,6 +32,7 @@ from backend.tools.cycle.evaluate import (
 from backend.tools.cycle.result import CycleResult
 from backend.tools.cycle.settings import CycleSettings
 from backend.tools.cycle.texts import TEXTS, report
+from backend.tools.thresholds import cycle_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers.errors import NotAllowed
 from drivers.link import ScopeBlock
@@ -40,9 +41,6 @@ from drivers.texts.message import text
 FloatArray = npt.NDArray[np.float64]
 _NEEDED = ("torque_actual", "velocity_actual")
 _BESIDE = ("dc_voltage", "load_ratio")
-#: Interval for reading slowly changing values [s].
-_SLOW_S = 1.0
-_STEP_S = 0.25
 
 
 @dataclass
@@ -134,7 +132,7 @@ async def _read(run: Run, keys: dict[str, str], duration_s: float) -> dict[str, 
         [(role, key) for role, key in keys.items() if role not in _NEEDED],
     )
     try:
-        for group, period_s in zip(groups, (0.0, _SLOW_S), strict=True):
+        for group, period_s in zip(groups, (0.0, threshold.SLOW_S), strict=True):
             if not group:
                 continue
             streams = hub.subscribe(drive.id, [key for _, key in group], period_s)
@@ -146,7 +144,7 @@ async def _read(run: Run, keys: dict[str, str], duration_s: float) -> dict[str, 
         begun = time.monotonic()
         while (passed := time.monotonic() - begun) < duration_s:
             run.progress(0.95 * passed / duration_s, text("cycle.reading", limit_s=duration_s))
-            await asyncio.sleep(min(_STEP_S, duration_s - passed))
+            await asyncio.sleep(min(threshold.STEP_S, duration_s - passed))
     finally:
         await hub.close()
     return {role: course.column(column) for role, (course, column) in found.items()}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from backend.tools.cycle.result import CycleHeat, CycleResult, Finding, Verdict
+from backend.tools.thresholds import cycle_texts as threshold
 from backend.tools.tool import Chart, Line, Note, Row, Section
 
 TEXTS: dict[str, tuple[str, str]] = {
@@ -209,7 +210,6 @@ _TONES: dict[Verdict, Literal["good", "warn", "plain"]] = {
 _WARN = frozenset(
     {"gaps", "peak_beyond", "peak_reached", "speed_beyond_rated", "overload_exceeded"}
 )
-_BINS = 24
 
 
 def report(result: CycleResult) -> Section:
@@ -300,10 +300,12 @@ def _cloud(result: CycleResult) -> Chart:
     lines: list[Line] = []
     if result.cloud_speed_rpm:
         first, last = result.cloud_speed_rpm[0], result.cloud_speed_rpm[-1]
-        width = (last - first) / _BINS or 1.0
+        width = (last - first) / threshold.BINS or 1.0
         bins: dict[int, list[float]] = {}
         for speed, torque in zip(result.cloud_speed_rpm, result.cloud_torque_percent, strict=True):
-            bins.setdefault(min(int((speed - first) / width), _BINS - 1), []).append(torque)
+            bins.setdefault(min(int((speed - first) / width), threshold.BINS - 1), []).append(
+                torque
+            )
         x = tuple(first + (each + 0.5) * width for each in sorted(bins))
         lines.append(Line("highest", x, tuple(max(bins[each]) for each in sorted(bins))))
         lines.append(Line("lowest", x, tuple(min(bins[each]) for each in sorted(bins))))

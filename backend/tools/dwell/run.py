@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.scales.units import AxisUnits
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.scales.units import AxisUnits
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.dwell.evaluate import Dwelt, evaluate, long_enough, reevaluate
 from backend.tools.dwell.result import DwellResult
@@ -21,7 +22,6 @@ from backend.tools.measuring.recording import cycle_s, require_signals
 from backend.tools.moves.go_back import go_back
 from backend.tools.thresholds import dwell_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text

@@ -17,11 +17,11 @@ from typing import Literal
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.optional import existing, torque_limits
-from backend.drive.terminals import read_terminals
-from backend.scales.units import AxisUnits
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing, torque_limits
+from backend.axes.drive.terminals import read_terminals
+from backend.axes.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.first_power.evaluate import (
     GOAL,

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.scales.units import AxisUnits
+from backend.axes.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.friction.evaluate import Map, evaluate, reevaluate
 from backend.tools.friction.result import FrictionResult

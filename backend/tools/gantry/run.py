@@ -17,7 +17,7 @@ from backend.analysis.coupled.excitation import Experiment, orthogonal_multisine
 from backend.analysis.loop.loop_structure import LoopFilters
 from backend.analysis.response.sampling import lag_response
 from backend.analysis.signals.excitation import choose_lines
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.autotune.gains import read_gains
 from backend.tools.autotune.verdict import fixed_of

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.friction.result import FrictionResult
 from backend.tools.friction.run import TOOL as FRICTION
 from backend.tools.friction.settings import FrictionSettings
@@ -17,7 +18,6 @@ from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from backend.tools.tool import Run, Tool
-from backend.work.jobs import Progress
 from drivers.texts.message import text
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from backend.analysis.mechanics.inertia import InertiaResult, Interval, estimate_inertia
 from backend.analysis.signals.spectrum import power_density
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals, RatioReference
 from backend.tools.measuring.recording import Recording

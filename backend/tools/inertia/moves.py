@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.probe import RoughFit, require_right_sign, rough_fit, smoothed

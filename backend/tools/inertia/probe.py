@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.readings import Reading
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.readings import Reading
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.interrupted import Interrupted, require_enabled

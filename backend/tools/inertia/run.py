@@ -12,8 +12,9 @@ import contextlib
 from dataclasses import replace
 
 from backend.analysis.mechanics.inertia import InertiaResult
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.inertia.evaluation import (
     InertiaOutcome,
@@ -38,7 +39,6 @@ from backend.tools.moves.end_search import find_ends
 from backend.tools.moves.go_back import go_back
 from backend.tools.thresholds import inertia_run as threshold
 from backend.tools.tool import Keep, Run, Tool
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text

@@ -16,18 +16,18 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import loop
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.axis.cyclic_mode import keeping_mode
-from backend.drive.drive import Drive
-from backend.drive.ports import address_of
-from backend.scales.units import AxisUnits
-from backend.scales.words import halt_remedy, halt_words
+from backend.axes.axis import loop
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.cyclic_mode import keeping_mode
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import address_of
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scales.words import halt_remedy, halt_words
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import JogSettings, end_of, require_scale
 from backend.tools.thresholds import jog_cyclic as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, motion_halted

@@ -11,14 +11,14 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.polled import PolledGuard
-from backend.drive.optional import ramp_keys
-from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
-from backend.scales.units import AxisUnits, ramp_raw
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.polled import PolledGuard
+from backend.axes.drive.optional import ramp_keys
+from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
+from backend.axes.scales.units import AxisUnits, ramp_raw
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.jog.hold import GAP_S, Hold
 from backend.tools.thresholds import jog_run as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange

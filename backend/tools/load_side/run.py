@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.mechanics.load_side_samples import GROUP, unwrapped
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look, speed_move

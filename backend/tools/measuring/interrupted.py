@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.scales.words import halt_remedy, halt_words
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.scales.words import halt_remedy, halt_words
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed, motion_halted
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.optional import existing
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.optional import existing
 from drivers.errors import NotAllowed
 
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis import loop
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession, channel
-from backend.drive.ports import address_of
+from backend.axes.axis import loop
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession, channel
+from backend.axes.drive.ports import address_of
 from backend.tools.measuring.alignment import FloatArray, aligned
 from backend.tools.measuring.interrupted import interrupted, raise_if_ended
 from backend.tools.measuring.recording import (

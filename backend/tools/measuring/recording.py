@@ -17,11 +17,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis import loop
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession, channel
-from backend.drive.ports import address_of
-from backend.scales.compare import disagreement_of
+from backend.axes.axis import loop
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession, channel
+from backend.axes.drive.ports import address_of
+from backend.axes.scales.compare import disagreement_of
+from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.alignment import BoolArray, FloatArray, Run, aligned
 from backend.tools.measuring.interrupted import (
     interrupted,
@@ -30,7 +31,6 @@ from backend.tools.measuring.interrupted import (
     require_held,
 )
 from backend.tools.thresholds import measuring_recording as threshold
-from backend.work.jobs import Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed

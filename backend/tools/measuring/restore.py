@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from backend.axis.axis import Axis
-from backend.drive.identity import confirm_identity
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.identity import confirm_identity
+from backend.foundation.work.jobs import JobResult
 from backend.tools.measuring.temporary import put_back_in_time
 from backend.tools.thresholds import measuring_restore as threshold
-from backend.work.jobs import JobResult
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.texts.message import text

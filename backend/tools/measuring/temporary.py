@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 
-from backend.axis.axis import Axis
-from backend.axis.restoring import (
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.restoring import (
     CLEANUP_TIMEOUT_S,
     RestoreFailed,
     not_restored,
     shielded,
     value_before,
 )
-from backend.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
-from backend.drive.optional import existing
+from backend.axes.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
+from backend.axes.drive.optional import existing
+from backend.foundation.work.jobs import Progress
 from backend.tools.moves.procedures import run_procedure
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.texts.message import Text, joined, text

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.optional import torque_limits
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.optional import torque_limits
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import speed_move
@@ -17,7 +18,6 @@ from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
 from backend.tools.thresholds import moves_end_search as threshold
-from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits as limit_texts
 from drivers.texts.message import text

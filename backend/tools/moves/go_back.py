@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from backend.tools.moves.raised_cosine import raised_cosine

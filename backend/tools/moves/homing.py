@@ -6,13 +6,13 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.polled import PolledGuard
-from backend.drive.readings import Reading
-from backend.scales.units import ramp_raw
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.polled import PolledGuard
+from backend.axes.drive.readings import Reading
+from backend.axes.scales.units import ramp_raw
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.autotune.axis_facts import brake_opens_s
 from backend.tools.thresholds import moves_homing as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

@@ -6,9 +6,9 @@ import asyncio
 import time
 from dataclasses import dataclass
 
-from backend.axis.axis import Axis, Envelope
+from backend.axes.axis.axis import Axis, Envelope
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.thresholds import moves_identification as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, Rejected

@@ -7,13 +7,13 @@ import time
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.polled import PolledGuard
-from backend.drive.optional import ramp_keys
-from backend.scales.units import AxisUnits, ramp_raw
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.polled import PolledGuard
+from backend.axes.drive.optional import ramp_keys
+from backend.axes.scales.units import AxisUnits, ramp_raw
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.autotune.axis_facts import brake_opens_s
 from backend.tools.thresholds import moves_move as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

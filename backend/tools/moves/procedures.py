@@ -7,11 +7,11 @@ import time
 from collections.abc import Sequence
 from contextlib import AsyncExitStack, nullcontext
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.motion.classes import motion_of
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.motion.classes import motion_of
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.thresholds import moves_procedures as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, Rejected
 from drivers.texts.message import Text, joined, profile_text, text

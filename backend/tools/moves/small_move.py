@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession, channel
-from backend.axis.cyclic_mode import keeping_mode
-from backend.drive.optional import torque_limits
-from backend.drive.ports import address_of
-from backend.scales.compare import FloatArray, measured_scale
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession, channel
+from backend.axes.axis.cyclic_mode import keeping_mode
+from backend.axes.drive.optional import torque_limits
+from backend.axes.drive.ports import address_of
+from backend.axes.scales.compare import FloatArray, measured_scale
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.tools.jog.cyclic import play_through
 from backend.tools.measuring.recording import cycle_s, enabled, quiet, require_signals
 from backend.tools.thresholds import moves_small_move as threshold
-from backend.work.jobs import JobResult, Progress
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.motion.envelope import Envelope
-from backend.scales.units import AxisUnits
+from backend.axes.motion.envelope import Envelope
+from backend.axes.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.probe import RoughFit
 from backend.tools.moves.raised_cosine import raised_cosine

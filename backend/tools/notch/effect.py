@@ -21,9 +21,10 @@ from backend.analysis.loop.notch import LevelCalibration, Notch
 from backend.analysis.loop.notch_effect import NotchEffect, fit_effect
 from backend.analysis.response.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import (
@@ -44,7 +45,6 @@ from backend.tools.notch.filters import plan_notches
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of
 from backend.tools.thresholds import notch_effect as threshold
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -25,8 +25,8 @@ from backend.analysis.loop.notch import (
     realised,
 )
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.notch.steps import attenuation_steps, hz_steps, level_steps

@@ -23,8 +23,9 @@ from backend.analysis.loop.notch_effect import LoopLines, NotchEffect, fit_effec
 from backend.analysis.response.sampled_model import LoopModel
 from backend.analysis.response.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import gains
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
@@ -39,7 +40,6 @@ from backend.tools.sweep.plan import Setup, sequences_of, setup_of
 from backend.tools.sweep.play import play_fitting, scaled_by_speed
 from backend.tools.sweep.run import filters_off
 from backend.tools.thresholds import notch_in_loop as threshold
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of

@@ -13,7 +13,7 @@ from backend.analysis.loop.notch import (
     encode_hz_levels,
     encode_hz_width,
 )
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 from backend.tools.notch.steps import hz_steps
 from backend.tools.thresholds import notch_trials as threshold
 from profiles.schema import NotchSlot

@@ -21,31 +21,12 @@ from backend.tools.safety_check.result import (
     Verdict,
 )
 from backend.tools.safety_check.settings import SafetySettings
+from backend.tools.thresholds import safety_check_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
-#: A speed below this share of the commanded one is a sign of the function, after this time.
-_LEFT, _LASTS_S = 0.9, 0.01
-#: The commanded speed must have been constant for this time, so that a run-up is not mistaken for a
-#: sign.
-STEADY_S = 0.15
-#: Window of the speed by position; standstill is below the greater of this share and this speed.
-_WINDOW_S, _STANDS_SHARE, _STANDS_RPM = 0.02, 0.02, 3.0
-#: The axis has stopped where no more than this share of the distance, or this distance, is left.
-_SETTLED, _RESOLVED_REV = 0.002, 2e-4
-#: The noise of the torque is measured without power: deviations, and the smallest torque that is
-#: distinguished [%].
-_DEVIATIONS, _LEAST_PERCENT, _FILTER = 5.0, 0.3, 5
-#: The torque before the trigger must be this many times the noise, or its end is not determined.
-_DISTINCT = 3.0
-_BEFORE_S = 0.1
-#: With SS1 the power is removed at standstill: below this share of the speed.
-_AT_STANDSTILL = 0.1
-#: Share by which the speed limit may be exceeded; share of the test speed above which the drive did
-#: not react.
-SPEED_MARGIN, _FOLLOWED = 0.05, 0.95
-_POINTS, _SHOWN_BEFORE_S = 400, 0.2
+_POINTS = 400
 #: Metadata that the checksum of the signature covers.
 _SIGNED = (
     "settings", "measured_at", "sample_rate_hz", "asked_until", "reports", "profile", "drive_id",
@@ -178,13 +159,13 @@ class _Check:
 
     def __init__(self, trace: Trace, settings: SafetySettings) -> None:
         self._trace, self._settings, self._rate = trace, settings, trace.sample_rate_hz
-        window = max(1, round(_WINDOW_S * self._rate))
+        window = max(1, round(threshold.WINDOW_S * self._rate))
         place = trace.position_rev
         speed = np.zeros_like(place)
         if place.size > window:
             speed[window:] = (place[window:] - place[:-window]) * self._rate / window * 60.0
         self._speed = speed
-        self._torque = np.abs(scipy.ndimage.median_filter(trace.torque_percent, _FILTER))
+        self._torque = np.abs(scipy.ndimage.median_filter(trace.torque_percent, threshold.FILTER))
         self._noise = self._torque_noise()
         found = self._first_sign()
         self._at: int | None = None if found is None else found[0]
@@ -194,9 +175,12 @@ class _Check:
         """Torque that is distinguished from noise, from the time before enabling [%]."""
         enabled = np.flatnonzero(self._trace.enabled)
         quiet = self._trace.torque_percent[: enabled[0]] if enabled.size else np.empty(0)
-        scatter = float(np.std(quiet)) if quiet.size > _FILTER else 0.0
-        offset = abs(float(np.mean(quiet))) if quiet.size > _FILTER else 0.0
-        return max(offset + _DEVIATIONS * scatter / math.sqrt(_FILTER / 1.5), _LEAST_PERCENT)
+        scatter = float(np.std(quiet)) if quiet.size > threshold.FILTER else 0.0
+        offset = abs(float(np.mean(quiet))) if quiet.size > threshold.FILTER else 0.0
+        return max(
+            offset + threshold.DEVIATIONS * scatter / math.sqrt(threshold.FILTER / 1.5),
+            threshold.LEAST_PERCENT,
+        )
 
     def _steady(self) -> BoolArray:
         """Samples at which the commanded speed has been constant, and not zero, for `STEADY_S`."""
@@ -205,7 +189,7 @@ class _Check:
         since = np.zeros(commanded.size, np.int64)
         since[changed] = changed
         age = np.arange(commanded.size) - np.maximum.accumulate(since)
-        steady: BoolArray = (age >= STEADY_S * self._rate) & (commanded != 0.0)
+        steady: BoolArray = (age >= threshold.STEADY_S * self._rate) & (commanded != 0.0)
         return steady
 
     def _first_sign(self) -> tuple[int, Sign] | None:
@@ -222,11 +206,12 @@ class _Check:
             signs.append((int(left[0]), "state"))
         commanded = trace.commanded_rpm
         slow = self._steady() & asked & trace.valid & trace.enabled
-        slow &= trace.speed_rpm * np.sign(commanded) < _LEFT * np.abs(commanded)
-        lasts = max(1, round(_LASTS_S * self._rate))
+        slow &= trace.speed_rpm * np.sign(commanded) < threshold.LEFT * np.abs(commanded)
+        lasts = max(1, round(threshold.LASTS_S * self._rate))
         run = np.convolve(slow, np.ones(lasts), "valid") >= lasts
         reached = np.flatnonzero(
-            self._steady() & (trace.speed_rpm * np.sign(commanded) >= _LEFT * np.abs(commanded))
+            self._steady()
+            & (trace.speed_rpm * np.sign(commanded) >= threshold.LEFT * np.abs(commanded))
         )
         if reached.size:
             found = np.flatnonzero(run & (np.arange(run.size) > reached[0]))
@@ -242,11 +227,13 @@ class _Check:
 
     def _rest(self, at: int, stands_rpm: float) -> int | None:
         """First sample from which the axis stays at its final position; None if it still turns."""
-        last = np.abs(self._speed[-max(1, round(_BEFORE_S * self._rate)) :])
+        last = np.abs(self._speed[-max(1, round(threshold.BEFORE_S * self._rate)) :])
         if float(np.median(last)) > stands_rpm:
             return None
         away = np.abs(self._trace.position_rev - self._trace.position_rev[-1])
-        return self._last_above(away, max(_SETTLED * float(away[at]), _RESOLVED_REV), at)
+        return self._last_above(
+            away, max(threshold.SETTLED * float(away[at]), threshold.RESOLVED_REV), at
+        )
 
     def result(self) -> SafetyResult:
         settings, trace = self._settings, self._trace
@@ -271,19 +258,21 @@ class _Check:
 
     def _followed(self) -> bool:
         highest = float(np.max(np.abs(self._speed), initial=0.0))
-        return highest >= _FOLLOWED * self._settings.speed_rpm
+        return highest >= threshold.FOLLOWED * self._settings.speed_rpm
 
     def _of_sign(self, at: int) -> dict[str, object]:
         rate, settings = self._rate, self._settings
-        before = slice(max(0, at - round(_BEFORE_S * rate)), at)
+        before = slice(max(0, at - round(threshold.BEFORE_S * rate)), at)
         speed = float(np.median(self._speed[before])) if at else 0.0
-        rest = self._rest(at, max(_STANDS_SHARE * abs(speed), _STANDS_RPM))
+        rest = self._rest(
+            at, max(threshold.STANDSTILL_SHARE * abs(speed), threshold.STANDSTILL_RPM)
+        )
         torque = float(np.median(self._torque[before])) if at else 0.0
         if settings.function == "ss1":
             end = self._torque.size if rest is None else rest
             torque = max(torque, float(np.max(self._torque[at:end], initial=0.0)))
         free = self._last_above(self._torque, self._noise, max(0, at - round(0.05 * rate)))
-        distinct = torque >= _DISTINCT * self._noise
+        distinct = torque >= threshold.DISTINCT * self._noise
         found: dict[str, object] = {
             "sign": self._sign, "speed_rpm": speed, "torque_before_percent": torque,
             "watched_ms": 1e3 * (self._speed.size - at) / rate, **self._shown(at),
@@ -325,7 +314,7 @@ class _Check:
 
     def _cut(self, at: int, free: int, speed: float) -> bool:
         """Whether the power was removed by the exchange at the beginning of a quick stop."""
-        fast = abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
+        fast = abs(float(self._speed[free])) > threshold.AT_STANDSTILL * abs(speed)
         return fast and bool(np.any(self._trace.quick_stop[at : free + 1]))
 
     def _exceeded(self, found: Mapping[str, object]) -> tuple[Exceeded, ...]:
@@ -339,7 +328,7 @@ class _Check:
         limited = settings.limited_rpm
         if settings.function == "speed_limit" and limited is not None:
             highest = float(np.max(np.abs(self._speed), initial=0.0))
-            if highest > (1.0 + SPEED_MARGIN) * limited:
+            if highest > (1.0 + threshold.SPEED_MARGIN) * limited:
                 over.append("speed")
         return tuple(over)
 
@@ -360,7 +349,7 @@ class _Check:
         if (
             settings.function == "ss1" and free is not None and distinct
             and obstacle != "quick_stop_cut"
-            and abs(float(self._speed[free])) > _AT_STANDSTILL * abs(speed)
+            and abs(float(self._speed[free])) > threshold.AT_STANDSTILL * abs(speed)
         ):  # fmt: skip
             return "power_off_at_speed"
         if exceeded:
@@ -379,7 +368,7 @@ class _Check:
 
     def _shown(self, at: int) -> dict[str, object]:
         """The trace around the first sign, thinned for a plot."""
-        begin = max(0, at - round(_SHOWN_BEFORE_S * self._rate))
+        begin = max(0, at - round(threshold.SHOWN_BEFORE_S * self._rate))
         step = max(1, -(-(self._speed.size - begin) // _POINTS))
         rows = np.arange(begin, self._speed.size, step)
         return {

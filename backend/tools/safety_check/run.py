@@ -13,10 +13,10 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import channel
-from backend.people.identity import acting_person
-from backend.scales.units import AxisUnits
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import channel
+from backend.axes.scales.units import AxisUnits
+from backend.foundation.people.identity import acting_person
 from backend.tools.autotune.axis_facts import brake_opens_s, read_facts
 from backend.tools.measuring.interrupted import Interrupted
 from backend.tools.measuring.recording import (
@@ -30,10 +30,12 @@ from backend.tools.measuring.recording import (
     require_signals,
     share,
 )
-from backend.tools.safety_check.evaluate import STEADY_S, Trace, evaluate, reevaluate
+from backend.tools.safety_check.evaluate import Trace, evaluate, reevaluate
 from backend.tools.safety_check.result import SafetyResult
 from backend.tools.safety_check.settings import SafetySettings
 from backend.tools.safety_check.texts import TEXTS, report
+from backend.tools.thresholds import safety_check_evaluate
+from backend.tools.thresholds import safety_check_run as threshold
 from backend.tools.tool import Run, Tool
 from drivers import link as bus
 from drivers.cia402 import Mode, State
@@ -45,14 +47,6 @@ from drivers.texts.message import Text, text
 FloatArray = npt.NDArray[np.float64]
 #: Column of the status word in the rows of the exchange.
 STATUS = 4
-#: Time without power before, for the noise of the torque; duration of a ramp; of the end [s].
-_LEAD_S, _RAMP_S, _END_S = 0.3, 0.4, 0.3
-#: A sign is a speed below this share of the commanded one in this many successive rows.
-_SIGN_SHARE, _SIGN_ROWS = 0.9, 10
-#: Used share of the travel, which leaves room for the run-down.
-_USED = 0.85
-#: For the speed limit, the axis first runs at this share of it.
-_BELOW_LIMIT = 0.8
 
 
 @dataclass
@@ -143,7 +137,7 @@ async def run(run: Run, settings: SafetySettings) -> SafetyResult:
     unsubscribe = session.cyclic.blocks(catch.blocks.append)
     asked_until: int | None = None
     try:
-        await asyncio.sleep(_LEAD_S)
+        await asyncio.sleep(threshold.LEAD_S)
         watch = _Watch(plan, settings, rate, catch, units)
         try:
             async with enabled(axis, session, Mode.CSV) as start:
@@ -208,25 +202,31 @@ def plan_of(settings: SafetySettings, rate: float, lead_s: float) -> FloatArray:
             "safety-check.speed-not-permitted", value=speed, limit=f"{settings.speed_limit:g} rpm"
         )
     lead = np.zeros(round((0.2 + lead_s) * rate))
-    ramp = np.linspace(0.0, 1.0, max(2, round(_RAMP_S * rate)))
-    end = np.zeros(round(_END_S * rate))
+    ramp = np.linspace(0.0, 1.0, max(2, round(threshold.RAMP_S * rate)))
+    end = np.zeros(round(threshold.END_S * rate))
     if function == "speed_limit":
         return _above_limit(settings, rate, lead, ramp, end)
     sign = -1.0 if function == "limit_negative" else 1.0
     whole_s = settings.wait_s + settings.watch_s
-    room = _USED * settings.travel_limit
-    way = speed / 60.0 * (whole_s + _RAMP_S)
+    room = threshold.USED * settings.travel_limit
+    way = speed / 60.0 * (whole_s + threshold.RAMP_S)
     if way <= room:
         parts = [lead, ramp, np.ones(round(whole_s * rate)), ramp[::-1], end]
         return np.asarray(sign * speed * np.concatenate(parts))
     if function in ("limit_positive", "limit_negative"):
-        raise _no_room(settings, way / _USED)
-    one_way_s = room / (speed / 60.0) - _RAMP_S
-    if one_way_s < 2.0 * STEADY_S:
-        raise _no_room(settings, speed / 60.0 * (2.0 * STEADY_S + _RAMP_S) / _USED)
+        raise _no_room(settings, way / threshold.USED)
+    one_way_s = room / (speed / 60.0) - threshold.RAMP_S
+    if one_way_s < 2.0 * safety_check_evaluate.STEADY_S:
+        raise _no_room(
+            settings,
+            speed
+            / 60.0
+            * (2.0 * safety_check_evaluate.STEADY_S + threshold.RAMP_S)
+            / threshold.USED,
+        )
     flat = np.ones(round(one_way_s * rate))
     there = np.concatenate([ramp, flat, ramp[::-1]])
-    pairs = int(np.ceil(whole_s / (2.0 * (one_way_s + 2.0 * _RAMP_S))))
+    pairs = int(np.ceil(whole_s / (2.0 * (one_way_s + 2.0 * threshold.RAMP_S))))
     return np.asarray(speed * np.concatenate([lead, *([there, -there] * pairs), end]))
 
 
@@ -245,10 +245,12 @@ def _above_limit(
             value=speed,
             limit=f"{1.2 * (limited or speed):g} rpm",
         )
-    low = _BELOW_LIMIT * limited
-    way = (low * (settings.wait_s + _RAMP_S) + speed * (settings.watch_s + _RAMP_S)) / 60.0
-    if way > _USED * settings.travel_limit:
-        raise _no_room(settings, way / _USED)
+    low = threshold.BELOW_LIMIT * limited
+    way = (
+        low * (settings.wait_s + threshold.RAMP_S) + speed * (settings.watch_s + threshold.RAMP_S)
+    ) / 60.0
+    if way > threshold.USED * settings.travel_limit:
+        raise _no_room(settings, way / threshold.USED)
     return np.concatenate(
         [
             lead,
@@ -284,7 +286,7 @@ class _Watch:
     ) -> None:  # fmt: skip
         self._plan, self._catch, self._rpm = plan, catch, units.velocity(1.0)
         self._after = round(settings.watch_s * rate)
-        self._steady = max(1, round(STEADY_S * rate))
+        self._steady = max(1, round(safety_check_evaluate.STEADY_S * rate))
         self._seen, self._slow, self._reached = 0, 0, False
         self._left_at: int | None = None
         self.ended_at: int | None = None
@@ -297,10 +299,10 @@ class _Watch:
             if wanted == 0.0 or self._plan[max(0, at - self._steady)] != wanted:
                 self._slow = 0
                 continue
-            follows = speed * np.sign(wanted) >= _SIGN_SHARE * abs(wanted)
+            follows = speed * np.sign(wanted) >= threshold.SIGN_SHARE * abs(wanted)
             self._reached = self._reached or follows
             self._slow = 0 if follows or not self._reached else self._slow + 1
-            if self._slow >= _SIGN_ROWS and self._left_at is None:
+            if self._slow >= threshold.SIGN_ROWS and self._left_at is None:
                 self._left_at = self._seen
         if self._left_at is None or self._seen - self._left_at < self._after:
             return False

@@ -9,7 +9,7 @@ import numpy as np
 
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.shaper import shaped
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.recording import (
     Play,

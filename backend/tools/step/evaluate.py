@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.signals.step import MoveMetrics, StepMetrics, move_metrics, step_metrics
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring.figures import figures_of
 from backend.tools.measuring.recording import Recording

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.jog.cyclic import run_up
 from backend.tools.measuring.recording import (
@@ -34,7 +35,6 @@ from backend.tools.step.result import StepAnswer
 from backend.tools.step.settings import StepRequest
 from backend.tools.step.texts import TEXTS, report
 from backend.tools.tool import Keep, Run, Tool
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
 from drivers.texts.message import text

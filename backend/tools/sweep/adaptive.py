@@ -10,15 +10,15 @@ import asyncio
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import Setup
 from backend.tools.sweep.play import Records, play_fitting, sized
-from backend.work.jobs import Progress
 
 #: Realisations with the same phases and opposite signs.
 _PAIR = 2

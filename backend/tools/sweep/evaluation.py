@@ -34,7 +34,7 @@ from backend.analysis.response.sampling import (
     sampled_command,
 )
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

@@ -8,9 +8,9 @@ from typing import Literal
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.optional import existing
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.optional import existing
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gains import read_gains
 from backend.tools.inertia.probe import Probed

@@ -11,8 +11,9 @@ from typing import TypeAlias
 import numpy as np
 
 from backend.analysis.signals.excitation import scaled
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import (
     Play,
@@ -29,7 +30,6 @@ from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import Setup, sequences_of
 from backend.tools.thresholds import sweep_play as threshold
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange, exceeded
 from drivers.halt import HaltCause

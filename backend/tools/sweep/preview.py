@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.signals.excitation import Excitation, crest_factor
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.measuring import excite
 from backend.tools.measuring.waveform import Band

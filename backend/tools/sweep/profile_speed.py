@@ -15,12 +15,12 @@ from contextlib import asynccontextmanager
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.axis.cyclic_mode import keeping_mode, modes_of_the_loop
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
-from backend.drive.terminals import read_terminals
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.axis.cyclic_mode import keeping_mode, modes_of_the_loop
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
+from backend.axes.drive.terminals import read_terminals
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from backend.tools.thresholds import sweep_profile_speed as threshold
 from drivers.cia402 import Mode, State

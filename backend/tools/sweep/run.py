@@ -10,8 +10,9 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, replace
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.inertia.probe import PULLED, Probed, holding_torque, probe_axis
 from backend.tools.measuring.computing import meanwhile
@@ -36,7 +37,6 @@ from backend.tools.sweep.settings import SweepRequest
 from backend.tools.sweep.stored import answer_of, raw_of, reevaluate
 from backend.tools.sweep.texts import TEXTS, report
 from backend.tools.tool import Keep, Run, Tool
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals import excitation as signals
 from backend.analysis.signals.arrays import FloatArray
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

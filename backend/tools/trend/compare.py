@@ -27,23 +27,12 @@ from typing import Literal
 import scipy
 
 from backend.tools.health.result import HealthRound, HealthValue, Quantity
+from backend.tools.thresholds import trend_compare as threshold
 
 Code = Literal["changed", "suspected", "same", "undecided", "not_seen", "few_runs", "no_check"]
 Direction = Literal["", "higher", "lower"]
-#: Probability of a false alarm in one comparison of an axis, for all quantities together.
-FALSE_ALARMS = 0.01
 #: Relative change that must be detected, by quantity. Other quantities are shown but not judged.
 LOOKED_FOR: dict[Quantity, float] = {"resonance": 0.05, "friction": 0.20, "inertia": 0.20}
-#: Smallest number of repeats; with fewer the spread is not known well enough.
-LEAST_REPEATS = 3
-#: Number of newest checks that are compared.
-CHECKS = 2
-#: Number of resonances that are judged; further ones are shown only.
-_JUDGED = 2
-#: A resonance that differs by more than this factor is a different one.
-_ANOTHER = 1.5
-#: Smallest relative standard deviation that is assumed, however well repeats agree.
-_FINEST = 1e-3
 _Z95 = 1.959964
 
 
@@ -77,13 +66,13 @@ class _Sample:
 
 def compare(baseline: Sequence[HealthRound], checks: Sequence[HealthRound]) -> list[Finding]:
     """Compare every quantity of the baseline with the newest two ``checks`` (oldest first)."""
-    newest = checks[-CHECKS:]
+    newest = checks[-threshold.CHECKS :]
     pairs = [
         (quantity, number, *_matched(baseline, newest, quantity, number))
         for quantity, number in _names(baseline)
     ]
     judged = [(quantity, number) for quantity, number, *_ in pairs if _is_judged(quantity, number)]
-    level = FALSE_ALARMS / max(len(judged), 1)
+    level = threshold.FALSE_ALARMS / max(len(judged), 1)
     return [
         _finding(quantity, number, before, now, len(newest), level)
         for quantity, number, before, now in pairs
@@ -91,7 +80,7 @@ def compare(baseline: Sequence[HealthRound], checks: Sequence[HealthRound]) -> l
 
 
 def _is_judged(quantity: Quantity, number: int) -> bool:
-    return quantity in LOOKED_FOR and (quantity != "resonance" or number <= _JUDGED)
+    return quantity in LOOKED_FOR and (quantity != "resonance" or number <= threshold.JUDGED)
 
 
 def _names(baseline: Sequence[HealthRound]) -> list[tuple[Quantity, int]]:
@@ -127,7 +116,7 @@ def _matched(
         found = min(same, key=lambda each: abs(math.log(each.value) - middle), default=None)
         if found is None or quantity not in ("resonance", "antiresonance"):
             return found
-        return found if abs(math.log(found.value) - middle) < math.log(_ANOTHER) else None
+        return found if abs(math.log(found.value) - middle) < math.log(threshold.ANOTHER) else None
 
     before = [found for one in baseline if (found := nearest(one)) is not None]
     now = [found for one in checks if (found := nearest(one)) is not None]
@@ -160,7 +149,7 @@ def _finding(
     shift = _mean(now) - base
     direction: Direction = "higher" if shift > 0 else "lower"
     values = (math.exp(base), math.exp(_mean(now)), math.expm1(shift))
-    if len(before) < LEAST_REPEATS:
+    if len(before) < threshold.LEAST_REPEATS:
         return Finding(quantity, number, "few_runs", direction, *values, looked_for=looked_for)
     half = _quantile(level, len(before) - 1 + len(now) - 1) * _error(before, now)
     low, high = shift - half, shift + half
@@ -177,7 +166,7 @@ def _code(low: float, high: float, shifts: list[float], looked_for: float) -> Co
     least = math.log1p(looked_for / 2)
     up, down = all(each >= least for each in shifts), all(each <= -least for each in shifts)
     if (up and low > 0) or (down and high < 0):
-        return "changed" if len(shifts) >= CHECKS else "suspected"
+        return "changed" if len(shifts) >= threshold.CHECKS else "suspected"
     whole = math.log1p(looked_for)
     return "same" if -whole < low and high < whole else "undecided"
 
@@ -192,7 +181,7 @@ def _error(before: Sequence[_Sample], now: Sequence[_Sample]) -> float:
     between = squares / (len(before) + len(now) - 2)
     every = [*before, *now]
     within = sum(each.deviation**2 for each in every) / len(every)
-    variance = max(between, within, _FINEST**2)
+    variance = max(between, within, threshold.FINEST**2)
     return math.sqrt(variance * (1 / len(before) + 1 / len(now)))
 
 

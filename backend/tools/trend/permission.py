@@ -15,7 +15,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
+from backend.tools.thresholds import trend_permission as threshold
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, text
 
@@ -23,8 +24,6 @@ from drivers.texts.message import Text, text
 LONGEST = timedelta(days=366)
 #: A due run begins within this time or counts as missed, as nobody expects motion later.
 WINDOW = timedelta(minutes=10)
-#: Number of attempts that are stored with a permission.
-KEPT = 50
 
 Cause = Literal["schedule", "trigger"]
 Outcome = Literal["running", "done", "not_made", "missed", "cancelled", "failed"]
@@ -83,7 +82,9 @@ class Permission(_Part):
             each for each in self.attempts if (each.outcome, each.at) != ("running", attempt.at)
         )
         begun = attempt.at if attempt.outcome == "running" else self.begun
-        return self.model_copy(update={"attempts": (*kept, attempt)[-KEPT:], "begun": begun})
+        return self.model_copy(
+            update={"attempts": (*kept, attempt)[-threshold.KEPT :], "begun": begun}
+        )
 
 
 def due(permission: Permission, now: datetime) -> datetime | None:

@@ -11,12 +11,13 @@ from datetime import UTC, datetime
 from sqlalchemy import Select, func, select
 from sqlalchemy.orm import Session
 
-from backend.drive.drive import Drive
-from backend.health.compare import LEAST_REPEATS, Finding, compare
-from backend.store.database import Store
-from backend.store.health_tables import HealthBaseline, HealthRun
+from backend.axes.drive.drive import Drive
+from backend.foundation.store.database import Store
+from backend.foundation.store.health_tables import HealthBaseline, HealthRun
 from backend.tools.health.result import HealthRound
 from backend.tools.health.settings import HealthSettings
+from backend.tools.thresholds import trend_compare
+from backend.tools.trend.compare import Finding, compare
 from drivers.errors import NotAllowed
 
 #: Settings that do not affect the values: the number of rounds, and the consent of a person.
@@ -25,7 +26,7 @@ _OF_NO_EFFECT = frozenset({"rounds", "consent"})
 
 @dataclass(frozen=True)
 class AxisOf:
-    """Identity of an axis: its key (see `backend.store.health_tables`), and data of its drive."""
+    """Identity of an axis: its key (see `health_tables`), and data of its drive."""
 
     key: str
     name: str
@@ -166,13 +167,13 @@ class HealthRecords:
                 raise NotAllowed(
                     "health.run-not-of-axis", value=unknown[0], runs=", ".join(map(str, unknown))
                 )
-            if len(rows) < LEAST_REPEATS:
+            if len(rows) < trend_compare.LEAST_REPEATS:
                 raise NotAllowed(
                     "health.baseline-few-runs",
                     value=len(rows),
-                    limit=str(LEAST_REPEATS),
+                    limit=str(trend_compare.LEAST_REPEATS),
                     rounds=len(rows),
-                    least=LEAST_REPEATS,
+                    least=trend_compare.LEAST_REPEATS,
                 )
             if len({row.settings_sha256 for row in rows}) > 1:
                 raise NotAllowed("health.baseline-different-settings")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.health.compare import Code, Direction, Finding
 from backend.tools.health.result import Quantity
+from backend.tools.trend.compare import Code, Direction, Finding
 from drivers.texts.message import Text, text
 
 _QUANTITIES: dict[Quantity, Text] = {

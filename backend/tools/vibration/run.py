@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import numpy.typing as npt
 
-from backend.scales.units import AxisUnits
+from backend.axes.scales.units import AxisUnits
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look, speed_move

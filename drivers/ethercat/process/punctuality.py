@@ -31,7 +31,7 @@ CHECK_S = 10.0
 PERIOD_US = 1000
 ALLOWED_MISSED = 0.001
 """Share of missed cycles up to which a frequency response keeps its accuracy; derived in
-`backend.preflight.verdicts`.
+`backend.foundation.preflight.verdicts`.
 """
 COARSEST_CLOCK_S = 1e-4
 """A tenth of the shortest cycle [s]. Before CPython 3.13 the clock of Windows has 15.6 ms steps."""

@@ -14,8 +14,8 @@ from unittest import mock
 
 import httpx
 
-from backend.handover.files import FORMATS, Format, files_of, fitting
-from backend.handover.model import AxisHandover, hand_over
+from backend.records.handover.files import FORMATS, Format, files_of, fitting
+from backend.records.handover.model import AxisHandover, hand_over
 from drivers.codec import decode, encode
 from drivers.errors import NotAllowed
 from drivers.virtual.device import Device

@@ -8,9 +8,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 from defusedxml.ElementTree import fromstring
 
-from backend.handover.eni import eni
-from backend.handover.esi import controller_of
-from backend.handover.model import OVERWRITTEN, AxisHandover, hand_over
+from backend.records.handover.eni import eni
+from backend.records.handover.esi import controller_of
+from backend.records.handover.model import OVERWRITTEN, AxisHandover, hand_over
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.ethercat.segment import Segment
 from drivers.virtual.wires.ethercat.slave import Slave

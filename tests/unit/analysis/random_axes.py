@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

@@ -19,7 +19,7 @@ from backend.analysis.response.sampling import (
 from backend.analysis.response.stated_band import ended_where_unknown
 from backend.analysis.signals.excitation import choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

@@ -12,7 +12,7 @@ from backend.analysis.response.reported import commanded, current_uncertainty, m
 from backend.analysis.response.sampling import SignalPath, lag_response
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

@@ -7,8 +7,8 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from drivers.link import Found

@@ -15,12 +15,12 @@ from pathlib import Path
 import pytest
 from sqlalchemy.orm import Session
 
-from backend.audit import AuditLog, Fact
-from backend.audit.chain import Anchor
-from backend.audit.facts import body_of
-from backend.audit.pending import PendingFile
-from backend.audit.trail import Filter, Trail
-from backend.store.database import DatabaseFailed, Store
+from backend.foundation.store.database import DatabaseFailed, Store
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.chain import Anchor
+from backend.records.audit.facts import body_of
+from backend.records.audit.pending import PendingFile
+from backend.records.audit.trail import Filter, Trail
 from drivers.texts.message import Text, prose
 from tests.support.station import until
 

@@ -13,16 +13,16 @@ import httpx
 import pytest
 from sqlalchemy import select
 
-from backend.audit import AuditLog, Fact
-from backend.audit.chain import append
-from backend.audit.facts import Action, body_of
-from backend.audit.recorder import AuditRecorder
-from backend.audit.trail import Filter, Trail
-from backend.drive.readings import Refusal, WriteRecord
+from backend.axes.drive.readings import Refusal, WriteRecord
+from backend.foundation.store.audit_tables import AuditEntry
+from backend.foundation.store.database import Store
+from backend.foundation.work.jobs import Job, Progress
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.chain import append
+from backend.records.audit.facts import Action, body_of
+from backend.records.audit.recorder import AuditRecorder
+from backend.records.audit.trail import Filter, Trail
 from backend.station.bench import Bench
-from backend.store.audit_tables import AuditEntry
-from backend.store.database import Store
-from backend.work.jobs import Job, Progress
 from drivers.errors import OutOfRange
 from drivers.texts.message import Text, prose, text
 from tests.support.station import until

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from backend.people.identity import LOCAL, Actor, acting, acting_person, by_itself
+from backend.foundation.people.identity import LOCAL, Actor, acting, acting_person, by_itself
 from backend.station.bench import Bench
 from drivers.link import LinkEvent, Unsubscribe
 from drivers.texts.message import text

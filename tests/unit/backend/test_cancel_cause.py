@@ -16,13 +16,13 @@ from backend.api.live.live import LiveHub
 from backend.api.live.page import Page
 from backend.api.live.watch import _LOOK_S, SILENCE_S, SILENT_END_S
 from backend.api.security.socket import OpenSockets
-from backend.audit.facts import Fact
-from backend.audit.recorder import AuditRecorder
 from backend.commands.base.remote import _not_done
-from backend.people.identity import LOCAL, Actor, acting
-from backend.people.station import People
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.people.station import People
+from backend.foundation.work.jobs import Job, JobRunner, Progress
+from backend.records.audit.facts import Fact
+from backend.records.audit.recorder import AuditRecorder
 from backend.station.bench import Bench
-from backend.work.jobs import Job, JobRunner, Progress
 from drivers.texts.message import Text, speaking, text
 
 

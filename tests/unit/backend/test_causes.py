@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from backend.axis.causes import hints
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.causes import hints
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from profiles.functions import Functions, TerminalBits, TerminalFacts
 from profiles.schema import IoFunction, IoTerminal, Parameter, Profile, Quirk, Signal
 from tests.support.memory_link import MemoryLink

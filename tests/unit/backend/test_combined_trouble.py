@@ -13,15 +13,15 @@ from backend.api.live.connection import Connection
 from backend.api.live.live import LiveHub
 from backend.api.live.messages import ScopeChannel, ScopeStart
 from backend.api.security.socket import OpenSockets
-from backend.axis.axis import Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.people.identity import LOCAL, Actor, acting
-from backend.people.station import People
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.people.station import People
+from backend.foundation.work.jobs import JobRunner, Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange
 from backend.station.monitor import Snapshot
-from backend.work.jobs import JobRunner, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.link import CyclicSignal

@@ -19,12 +19,12 @@ import typer
 from typer.testing import CliRunner
 
 from backend import cli
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
 from backend.commands.base import session
 from backend.commands.drive import live, scales
 from backend.commands.drive.values import assignment, line, show_readings
 from backend.commands.server.serve import _print_problems
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
 from backend.station.bench import Bench
 from backend.station.records import REMOTE_S
 from drivers.errors import LinkLost, NotAllowed

@@ -7,7 +7,7 @@ from typing import cast
 
 import pytest
 
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.commands.measuring.friction import _here, _lines
 from backend.tools.friction.result import FrictionResult
 

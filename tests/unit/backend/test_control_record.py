@@ -8,10 +8,10 @@ from typing import Any
 
 from backend.api.live.control import PeopleControl
 from backend.api.live.people_messages import LeaseAnswer, LeaseAsk
-from backend.audit.facts import Fact
-from backend.people.identity import LOCAL, Identity
-from backend.people.lease import ANSWER_WITHIN_S, Leases
-from backend.work.journal import Journal
+from backend.foundation.people.identity import LOCAL, Identity
+from backend.foundation.people.lease import ANSWER_WITHIN_S, Leases
+from backend.foundation.work.journal import Journal
+from backend.records.audit.facts import Fact
 from drivers.texts.message import Text
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from backend.api.tuning import design as routes_design
-from backend.library.measurements import BadMeasurement
+from backend.records.library.measurements import BadMeasurement
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 from pydantic import ValidationError
 
 from backend.api.drive.models_parameters import ParameterWrite
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.drive.value_check import checked
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.drive.value_check import checked
 from backend.tools.parameters import read_all
 from drivers.errors import (
     DriveError,

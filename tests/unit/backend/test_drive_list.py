@@ -10,12 +10,12 @@ import pytest
 
 from backend.api.errors import NotFound
 from backend.api.station.routes import remove_drive
-from backend.axis.remembered import AxisRecord
-from backend.scales.scale import ScaleUnknown
-from backend.scales.taught import Taught
+from backend.axes.axis.remembered import AxisRecord
+from backend.axes.scales.scale import ScaleUnknown
+from backend.axes.scales.taught import Taught
+from backend.foundation.store.files import StorageFailed
 from backend.station.bench import Bench
 from backend.station.drive_list import DriveList, SavedDrive, SavedPort
-from backend.store.files import StorageFailed
 from drivers.errors import LinkLost
 from drivers.link import Found
 from tests.support.memory_link import MemoryLink

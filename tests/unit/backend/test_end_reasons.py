@@ -23,20 +23,20 @@ from backend.api.live.jog import Jogs
 from backend.api.live.messages import JogEnded, JogStart, JogStop, StopAll, StopTaken, from_page
 from backend.api.live.people_messages import EnableRelease
 from backend.api.live.people_views import PeopleViews
-from backend.audit import AuditLog, Fact
-from backend.audit.recorder import AuditRecorder
-from backend.audit.trail import Filter, Trail
 from backend.commands.drive import live as command
-from backend.people.identity import LOCAL
-from backend.people.rights import Right
-from backend.people.station import People
-from backend.people.support import Invitation, Support
+from backend.foundation.people.identity import LOCAL
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
+from backend.foundation.people.support import Invitation, Support
+from backend.foundation.store.database import Store
+from backend.foundation.work.jobs import Job, Progress
+from backend.records.audit import AuditLog, Fact
+from backend.records.audit.recorder import AuditRecorder
+from backend.records.audit.trail import Filter, Trail
 from backend.station.bench import Bench
-from backend.store.database import Store
 from backend.tools.jog.release import END_OF_ENABLING, END_OF_JOG, Release
 from backend.tools.jog.run import end_of
 from backend.tools.moves.identification import state_of
-from backend.work.jobs import Job, Progress
 from drivers.errors import DriveError
 from drivers.texts.message import Language, Text, prose, speaking, text
 from drivers.texts.profile_errors import profile_error_text

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.exclusive import ExclusiveAccessHeld
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.exclusive import ExclusiveAccessHeld
+from backend.axes.drive.ports import Port
 from backend.tools.moves.procedures import run_procedure
 from drivers.errors import DriveError
 from drivers.link import Address

@@ -14,17 +14,18 @@ import pytest
 from backend.api.app import make_app
 from backend.api.live.live import LiveHub
 from backend.api.security.socket import OpenSockets
-from backend.axis.cyclic import CyclicState
-from backend.functions.gear import write_gear
-from backend.people.elapsed import elapsed_s, moment_of
-from backend.people.identity import LOCAL, Actor, acting
-from backend.people.lease import Leases
-from backend.people.rights import Right
-from backend.people.station import People
-from backend.people.support import Support
-from backend.restore.identity import identity_of
-from backend.restore.store import RestoreStore
-from backend.scales.gear_calculator import GearValue
+from backend.axes.axis.cyclic import CyclicState
+from backend.axes.functions.gear import write_gear
+from backend.axes.restore.identity import identity_of
+from backend.axes.restore.store import RestoreStore
+from backend.axes.scales.gear_calculator import GearValue
+from backend.foundation.people.elapsed import elapsed_s, moment_of
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.people.lease import Leases
+from backend.foundation.people.rights import Right
+from backend.foundation.people.station import People
+from backend.foundation.people.support import Support
+from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange, exchange_for
@@ -32,7 +33,6 @@ from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings
 from backend.tools.moves.end_search import limited
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.texts.message import Text, text
@@ -298,7 +298,7 @@ async def test_an_axis_that_its_drive_still_brakes_keeps_its_power(
 ) -> None:
     """It coasted on from 2 s after the halt, and its motion ended as if nothing was."""
     for name, seconds in (("_HALT_S", 0.1), ("_RAMP_S", 0.1), ("_COAST_S", 0.1)):
-        monkeypatch.setattr(f"backend.axis.axis.{name}", seconds)
+        monkeypatch.setattr(f"backend.axes.axis.axis.{name}", seconds)
     began_s, reads = time.monotonic(), 0
 
     def moves(place: tuple[int, int]) -> None:
@@ -585,8 +585,8 @@ async def test_a_measurement_is_answered_although_its_exchange_is_never_set_up(
         begun.append("set up")
         await asyncio.Event().wait()
 
-    monkeypatch.setattr("backend.axis.cyclic.CyclicSession.__init__", lambda *_args: None)
-    monkeypatch.setattr("backend.axis.cyclic.CyclicSession.start", never)
+    monkeypatch.setattr("backend.axes.axis.cyclic.CyclicSession.__init__", lambda *_args: None)
+    monkeypatch.setattr("backend.axes.axis.cyclic.CyclicSession.start", never)
     limits = {"travel_limit": 3, "speed_limit": 300, "torque_limit": 60, "time_limit_s": 20}
     for _ in range(2):
         answer = await http.post("/drives/x/jobs/inertia", json=limits)

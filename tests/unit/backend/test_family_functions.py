@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.drive.catalog import functions_of
+from backend.axes.drive.catalog import functions_of
 from profiles import load_all, load_profile
 from profiles.schema import Parameter, Profile
 from tests.unit.backend.conftest import changed

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.fault_history import named_fault, read_history
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.fault_history import named_fault, read_history
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.station.connected_drive import ConnectedDrive
 from backend.station.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from backend.drive.drive import Drive
-from backend.drive.faults import active_faults, fault_keys
-from backend.drive.ports import Port
-from backend.drive.readings import Reading
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.faults import active_faults, fault_keys
+from backend.axes.drive.ports import Port
+from backend.axes.drive.readings import Reading
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
 

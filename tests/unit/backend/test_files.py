@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.store.files import StorageFailed, write_atomically
+from backend.foundation.store.files import StorageFailed, write_atomically
 
 
 @pytest.fixture

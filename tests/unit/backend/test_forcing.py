@@ -7,14 +7,14 @@ from collections.abc import Callable
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.drive.terminals import ProbeSettings, probe_bits, read_terminals, set_probe
-from backend.functions import forcing
-from backend.functions.forcing import ForcingSessions
-from backend.people.lease import Leases
-from backend.work.jobs import JobRunner
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.drive.terminals import ProbeSettings, probe_bits, read_terminals, set_probe
+from backend.axes.functions import forcing
+from backend.axes.functions.forcing import ForcingSessions
+from backend.foundation.people.lease import Leases
+from backend.foundation.work.jobs import JobRunner
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.texts.answers import sentence
 from drivers.texts.message import text

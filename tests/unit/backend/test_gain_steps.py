@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pytest
 import scipy
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.gain_steps import GainStep, GainSteps, judged
 from backend.tools.autotune.result import GainStepsInfo
 from backend.tools.measuring.figures import figures_of

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.jog.cyclic import GeneratorSettings, signal
 from drivers.errors import OutOfRange
 

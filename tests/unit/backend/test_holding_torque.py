@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from backend.drive.readings import Reading
+from backend.axes.drive.readings import Reading
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia import probe
 from drivers.errors import LinkTimeout

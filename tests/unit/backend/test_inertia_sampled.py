@@ -10,7 +10,7 @@ import pytest
 
 from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
 from backend.analysis.mechanics.inertia import InertiaResult
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings, _loop_gain, evaluate
 from backend.tools.measuring.recording import Recording

@@ -13,11 +13,11 @@ from typing import Any
 import pytest
 
 from backend.analysis.loop.design import Candidate
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune import notches as tune_notches
 from backend.tools.autotune import present as tune_present
 from backend.tools.measuring.interrupted import Interrupted, raise_if_ended
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, MotionHalted, NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, LoopState

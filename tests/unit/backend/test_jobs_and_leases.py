@@ -6,9 +6,9 @@ import asyncio
 
 import pytest
 
-from backend.axis.restoring import shielded
-from backend.people.lease import Leases, Notice
-from backend.work.jobs import JobRunner, Progress
+from backend.axes.axis.restoring import shielded
+from backend.foundation.people.lease import Leases, Notice
+from backend.foundation.work.jobs import JobRunner, Progress
 from drivers.errors import Busy, LinkLost, LinkTimeout, NotAllowed, OutOfRange
 
 

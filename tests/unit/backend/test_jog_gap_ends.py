@@ -17,11 +17,11 @@ import pytest
 
 from backend.api.live.jog import Jogs
 from backend.api.live.messages import JogRenew, JogStart
-from backend.people.identity import LOCAL, Actor, acting
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
-from backend.work.jobs import Job, JobResult, Progress
 from benchmarks.stopping.clock import run_simulated
 from drivers.errors import Busy
 from drivers.texts.message import text

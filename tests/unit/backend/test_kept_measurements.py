@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia import run as inertia_run
 from backend.tools.inertia.evaluation import InertiaSettings
@@ -19,7 +20,6 @@ from backend.tools.inertia.probe import RoughFit
 from backend.tools.measuring.recording import Recording
 from backend.tools.step import run as step_run
 from backend.tools.step.evaluate import StepSettings
-from backend.work.jobs import Progress
 from drivers.errors import LinkLost, NotAllowed, OutOfRange
 
 FACTS = AxisFacts(1.27, True, None, None, None, None, None, True)

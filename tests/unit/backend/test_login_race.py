@@ -10,11 +10,11 @@ from unittest.mock import AsyncMock
 import pytest
 from argon2 import PasswordHasher
 
-from backend.people.accounts import Accounts
-from backend.people.errors import NotLoggedIn
-from backend.people.passwords import Passwords
-from backend.people.rights import Role
-from backend.store.database import Store
+from backend.foundation.people.accounts import Accounts
+from backend.foundation.people.errors import NotLoggedIn
+from backend.foundation.people.passwords import Passwords
+from backend.foundation.people.rights import Role
+from backend.foundation.store.database import Store
 
 OLD, NEW = "eleven blue horses", "twelve green horses"
 

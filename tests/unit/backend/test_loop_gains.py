@@ -10,7 +10,7 @@ import math
 import pytest
 
 from backend.analysis.loop.loop_structure import Gains, LoopFilters
-from backend.drive.drive import Drive
+from backend.axes.drive.drive import Drive
 from backend.tools.autotune.gains import filter_choices, plan_design, plan_filters, plan_gains
 from drivers.errors import NotAllowed, OutOfRange
 from profiles.loader import load_profile

@@ -10,7 +10,7 @@ import typer
 
 from backend.commands.measuring import measure
 from backend.commands.measuring.measure import Where
-from backend.store.files import StorageFailed, require_writable
+from backend.foundation.store.files import StorageFailed, require_writable
 
 WHERE = Where("canopen://can9", 1, None, None, None)
 ANSWER = {"inertia_kgm2": 1.5e-4}

@@ -12,9 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend.drive.drive import Drive
-from backend.library import measurements
-from backend.library.measurements import BadMeasurement, MeasurementStore, profile_version, unpack
+from backend.axes.drive.drive import Drive
+from backend.records.library import measurements
+from backend.records.library.measurements import (
+    BadMeasurement,
+    MeasurementStore,
+    profile_version,
+    unpack,
+)
 from backend.station.evaluation import evaluate
 from drivers.errors import DriveError, NotAllowed
 from tests.support import measurements as known

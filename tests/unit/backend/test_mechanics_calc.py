@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from backend.scales.gear_calculator import GearPlan, Mechanics, plan_gear
+from backend.axes.scales.gear_calculator import GearPlan, Mechanics, plan_gear
 from drivers.errors import OutOfRange
 from profiles import load_profile
 

@@ -10,12 +10,12 @@ from typing import cast
 
 import pytest
 
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.foundation.work.journal import Journal
 from backend.station import monitor as watching
 from backend.station.connected_drive import ConnectedDrive
-from backend.work.journal import Journal
 from drivers.cia402 import State
 from drivers.texts.message import text
 from tests.support.servo import STATUS, Servo

@@ -10,16 +10,16 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.functions.assign import assign
-from backend.motion.authority import UNATTENDED_S, MotionAuthority
-from backend.motion.grant import Grant, NotGranted
-from backend.motion.stopping import stops
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.functions.assign import assign
+from backend.axes.motion.authority import UNATTENDED_S, MotionAuthority
+from backend.axes.motion.grant import Grant, NotGranted
+from backend.axes.motion.stopping import stops
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
-from backend.work.jobs import JobResult, Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed
 from drivers.texts.message import Text, text
@@ -148,7 +148,7 @@ async def test_an_axis_left_enabled_by_a_script_loses_its_power(
     x: ConnectedDrive, bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert UNATTENDED_S == 600.0
-    monkeypatch.setattr("backend.axis.axis.UNATTENDED_S", 0.05)
+    monkeypatch.setattr("backend.axes.axis.axis.UNATTENDED_S", 0.05)
     await x.axis.transition(State.OPERATION_ENABLED, Mode.PV)
     standing = bench.authority.grant_of("x")
     assert standing is not None
@@ -224,7 +224,7 @@ async def test_an_input_that_is_on_gets_no_function() -> None:
 async def test_a_setting_that_turns_the_shaft_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     async def not_seen(*_what: object) -> None: ...
 
-    monkeypatch.setattr("backend.functions.assign._require_inputs_off", not_seen)
+    monkeypatch.setattr("backend.axes.functions.assign._require_inputs_off", not_seen)
     axis, link = an_m6l()
     link.device.inject("di2", 1.0)
     with pytest.raises(NotAllowed, match="began to turn") as reported:
@@ -252,8 +252,8 @@ async def test_commands_are_no_settings() -> None:
 ROOT = Path(__file__).resolve().parents[3] / "backend"
 #: Who may call the loop or write to a link past `Drive`, and why.
 ALLOWED = {
-    "drive_to": {"axis/loop.py"},
-    "play": {"axis/loop.py"},
+    "drive_to": {"axes/axis/loop.py"},
+    "play": {"axes/axis/loop.py"},
 }
 
 
@@ -283,7 +283,7 @@ def test_nothing_writes_to_a_link_past_the_drive() -> None:
             of_link = isinstance(owner, ast.Attribute) and owner.attr == "link"
             if node.func.attr == "write" and of_link:
                 found.add(path.relative_to(ROOT).as_posix())
-    assert found == {"drive/drive.py", "axis/power.py"}
+    assert found == {"axes/drive/drive.py", "axes/axis/power.py"}
 
 
 def test_only_stop_brakes_without_a_grant() -> None:
@@ -296,4 +296,4 @@ def test_only_stop_brakes_without_a_grant() -> None:
                 # Also a mention that is no call: a bound method can be handed on.
                 if isinstance(node, ast.Attribute) and node.attr == "stop_by":
                     found.add(path.relative_to(house).parent.as_posix())
-    assert found == {"backend/stopping", "backend/axis/stop"}
+    assert found == {"backend/axes/stopping", "backend/axes/axis/stop"}

@@ -9,10 +9,11 @@ from typing import Literal
 import httpx
 import pytest
 
-from backend.axis.axis import Envelope
-from backend.axis.cyclic import CyclicState
-from backend.drive.ports import Port
-from backend.people.identity import LOCAL, Actor, acting
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.cyclic import CyclicState
+from backend.axes.drive.ports import Port
+from backend.foundation.people.identity import LOCAL, Actor, acting
+from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
@@ -20,7 +21,6 @@ from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves import move as moving
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import text
@@ -162,7 +162,7 @@ async def test_stop_goes_over_the_second_port_when_the_first_is_dead(
 async def test_after_stop_power_is_not_cut_while_the_axis_still_moves(
     bench: Bench, x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.4)
+    monkeypatch.setattr("backend.axes.axis.axis.CLEANUP_TIMEOUT_S", 0.4)
 
     async def turn(_progress: Progress) -> None:
         async with x.axis.enabled(Mode.PV, ENVELOPE):
@@ -260,7 +260,7 @@ async def test_everything_that_could_not_be_restored_is_named(
 async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
     x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("backend.axis.axis.CLEANUP_TIMEOUT_S", 0.05)
+    monkeypatch.setattr("backend.axes.axis.axis.CLEANUP_TIMEOUT_S", 0.05)
 
     async def work() -> None:
         async with x.axis.restoring("6081:00"):

@@ -15,9 +15,9 @@ from backend.analysis.loop.notch_effect import fit_effect, seen_ratio
 from backend.analysis.response.sampling import SignalPath
 from backend.api.tuning.design import preview_notches
 from backend.api.tuning.models import NotchPreviewRequest
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.notch.filters import encode, off_raw, response
 from backend.tools.notch.meaning import NotchMeaning

@@ -14,8 +14,15 @@ import numpy as np
 import pytest
 
 from backend.api.app import make_app
-from backend.recording.chunks import HEADER, MAGIC, SAMPLES, frame, json_chunk, samples_chunk
-from backend.recording.library import RecordingLibrary, Retention
+from backend.records.recording.chunks import (
+    HEADER,
+    MAGIC,
+    SAMPLES,
+    frame,
+    json_chunk,
+    samples_chunk,
+)
+from backend.records.recording.library import RecordingLibrary, Retention
 from backend.station.bench import Bench
 from tests.unit.recording.support import block, header
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.autotune.axis_facts import read_facts
@@ -16,7 +17,6 @@ from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move
 from backend.tools.sweep.plan import drive_limit_percent
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
 from tests.support.servo import Servo

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from backend.parameters.csv_list import read_csv, write_csv
-from backend.parameters.set_file import BadSet, Row
+from backend.axes.parameters.csv_list import read_csv, write_csv
+from backend.axes.parameters.set_file import BadSet, Row
 from profiles import load_profile
 from profiles.schema import Profile
 

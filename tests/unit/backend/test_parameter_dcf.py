@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from backend.axes.parameters.dcf import read_dcf, write_dcf
+from backend.axes.parameters.lists import import_list
+from backend.axes.parameters.set_file import BadSet, Row, parse
 from backend.commands.drive.params import app
-from backend.parameters.dcf import read_dcf, write_dcf
-from backend.parameters.lists import import_list
-from backend.parameters.set_file import BadSet, Row, parse
 from drivers.texts.message import Text
 from profiles import load_profile
 from profiles.importer import export_eds

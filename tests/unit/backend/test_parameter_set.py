@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backend.drive.drive import Drive
-from backend.library import SetLibrary
-from backend.parameters import set_file as parameter_set
-from backend.parameters.set_file import BadSet
+from backend.axes.drive.drive import Drive
+from backend.axes.parameters import set_file as parameter_set
+from backend.axes.parameters.set_file import BadSet
+from backend.records.library import SetLibrary
 from backend.tools import parameters
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed, OutOfRange, Rejected
 from drivers.link import Address

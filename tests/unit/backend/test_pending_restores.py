@@ -11,12 +11,12 @@ from pathlib import Path
 import httpx
 import pytest
 
-from backend.axis.axis import Envelope
-from backend.axis.restoring import RestoreFailed
-from backend.drive.identity import read_serial
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.restoring import RestoreFailed
+from backend.axes.drive.identity import read_serial
+from backend.foundation.store.files import StorageFailed
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
-from backend.store.files import StorageFailed
 from backend.tools.measuring.temporary import temporary
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost

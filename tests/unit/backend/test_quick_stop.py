@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
-from backend.axis.stop.quick_stop import STOP_S
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.stop.quick_stop import STOP_S
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.measuring.recording import Play, bus_limits, enabled, play
 from backend.tools.measuring.temporary import stopping_hard

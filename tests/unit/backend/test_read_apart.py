@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from backend.parameters import set_file
-from backend.parameters.set_file import BadSet
-from backend.work import apart
-from backend.work.apart import SMALL_BYTES, ReadingEnded, read_apart
+from backend.axes.parameters import set_file
+from backend.axes.parameters.set_file import BadSet
+from backend.foundation.work import apart
+from backend.foundation.work.apart import SMALL_BYTES, ReadingEnded, read_apart
 
 
 async def test_large_ones_are_read_elsewhere_and_after_others() -> None:

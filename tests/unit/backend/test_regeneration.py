@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from backend.functions.regeneration import (
+from backend.axes.functions.regeneration import (
     BrakingCycle,
     BrakingLimits,
     Resistor,

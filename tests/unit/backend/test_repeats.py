@@ -13,8 +13,9 @@ import pytest
 
 from backend.analysis.loop.notch import Notch
 from backend.analysis.loop.notch_effect import NotchEffect
-from backend.axis.axis import Envelope
-from backend.drive.drive import Drive
+from backend.axes.axis.axis import Envelope
+from backend.axes.drive.drive import Drive
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import time_budget as tune_time
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.measuring import repeats
@@ -23,7 +24,6 @@ from backend.tools.measuring.repeats import Repeats
 from backend.tools.moves import go_back as go_back_tool
 from backend.tools.notch import effect as notch_effect
 from backend.tools.sweep import play as sweep_play
-from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 from profiles.loader import load_profile
 from tests.unit.backend.test_tune_time import Clock

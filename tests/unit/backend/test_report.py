@@ -16,9 +16,9 @@ from pypdf import PdfReader
 from typer.testing import CliRunner
 
 from backend import report
+from backend.axes.drive.drive import Drive
 from backend.cli import app
-from backend.drive.drive import Drive
-from backend.library.measurements import MeasurementStore
+from backend.records.library.measurements import MeasurementStore
 from backend.report.changes import Change, ChangeLog, net
 from backend.report.compose import compose
 from backend.report.document import Document, Language, Note, Table

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from backend.api.tuning import measure
-from backend.drive.drive import Drive
-from backend.library.measurements import BadMeasurement, MeasurementStore
+from backend.axes.drive.drive import Drive
+from backend.records.library.measurements import BadMeasurement, MeasurementStore
 from backend.report.chapters import chapter
 from backend.report.compose import _verdict
 from backend.report.document import Block, Note, Table

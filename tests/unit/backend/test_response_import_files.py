@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from backend.response_import.contents import MAX_UNPACKED_BYTES, read_table
-from backend.response_import.errors import BadRecording
-from backend.response_import.evaluation import ImportSettings, evaluate_file
-from backend.response_import.signals import signals_of
-from backend.response_import.units import scale_of
+from backend.records.response_import.contents import MAX_UNPACKED_BYTES, read_table
+from backend.records.response_import.errors import BadRecording
+from backend.records.response_import.evaluation import ImportSettings, evaluate_file
+from backend.records.response_import.signals import signals_of
+from backend.records.response_import.units import scale_of
 
 N = 400
 T = np.arange(N) / 1000.0

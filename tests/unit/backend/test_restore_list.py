@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from backend.axes.drive.pending_restore import PendingRestore
+from backend.axes.restore import store as store_module
+from backend.axes.restore.identity import DriveIdentity, identity_of
+from backend.axes.restore.process import lives, this_process
+from backend.axes.restore.store import RestoreStore
 from backend.commands.base import restoring
 from backend.commands.base.state import STATE_FOLDER_VARIABLE, state_folder
-from backend.drive.pending_restore import PendingRestore
-from backend.restore import store as store_module
-from backend.restore.identity import DriveIdentity, identity_of
-from backend.restore.process import lives, this_process
-from backend.restore.store import RestoreStore
 from backend.station.connected_drive import ConnectedDrive
 from drivers.errors import Busy, NotAllowed
 from tests.support.servo import Servo

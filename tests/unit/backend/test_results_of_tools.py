@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from backend.drive.drive import Drive
-from backend.library.measurements import unpack
+from backend.axes.drive.drive import Drive
+from backend.records.library.measurements import unpack
 from backend.station.evaluation import recompute
 from backend.tools.registry import BY_KIND
 from backend.tools.results import ToolOutcome

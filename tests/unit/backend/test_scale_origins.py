@@ -7,19 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from backend.axis import teaching
-from backend.axis.axis import Axis
-from backend.axis.remembered import AxisRecord, AxisStore
+from backend.axes.axis import teaching
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.remembered import AxisRecord, AxisStore
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.drive.readings import Reading
+from backend.axes.scales.resolve import Reported, scales_of
+from backend.axes.scales.scale import Origin, ScaleUnknown, Uncertainty
+from backend.axes.scales.taught import Taught, TaughtDrive
+from backend.axes.scales.units import AxisUnits, read_units
+from backend.axes.scales.units_found import nearest_unit
+from backend.axes.scales.words import apart, halt_words
 from backend.commands.drive.scales import take_taught, taught_file
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.drive.readings import Reading
-from backend.scales.resolve import Reported, scales_of
-from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
-from backend.scales.taught import Taught, TaughtDrive
-from backend.scales.units import AxisUnits, read_units
-from backend.scales.units_found import nearest_unit
-from backend.scales.words import apart, halt_words
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.halt import HaltCause, Halted
 from drivers.link import Found

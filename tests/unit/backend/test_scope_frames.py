@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from backend.api.live.scope_blocks import encode_block
-from backend.drive.drive import Drive
-from backend.scales.units import AxisUnits
-from backend.scope.units import axis_scale
+from backend.axes.drive.drive import Drive
+from backend.axes.scales.units import AxisUnits
+from backend.axes.scope.units import axis_scale
 from drivers.link import ScopeBlock
 from profiles.loader import load_profile
 from tests.support.memory_link import MemoryLink
 
-from backend.drive.ports import Port  # isort: skip
+from backend.axes.drive.ports import Port  # isort: skip
 
 
 def decode(frame: bytes) -> tuple[dict[str, float], np.ndarray, np.ndarray]:

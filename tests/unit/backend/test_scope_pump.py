@@ -11,8 +11,8 @@ from fastapi import WebSocketDisconnect
 
 from backend.api.live.messages import ScopeChannel, ScopeStart
 from backend.api.live.scope import ScopeStreams, _Running
+from backend.axes.scope.hub import QUEUE_BLOCKS, Subscription
 from backend.commands.drive.samples import decode
-from backend.scope.hub import QUEUE_BLOCKS, Subscription
 from backend.station.bench import Bench
 
 

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from backend.scope.hub import ScopeHub
+from backend.axes.scope.hub import ScopeHub
 from backend.station.connected_drive import ConnectedDrive
 
 KEY = "6064:00"

@@ -6,9 +6,9 @@ from typing import Literal
 
 import pytest
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.parameters.set_file import storable
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.parameters.set_file import storable
 from backend.station.second_port import missing_ports, require_same_drive
 from drivers.codec import encode
 from drivers.errors import NotAllowed

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording

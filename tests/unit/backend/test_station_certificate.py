@@ -18,8 +18,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
-from backend.people import tls
-from backend.people.tls import AUTHORITY_FILE, Certificate, station_certificate
+from backend.foundation.people import tls
+from backend.foundation.people.tls import AUTHORITY_FILE, Certificate, station_certificate
 
 NAMES = ["localhost", "127.0.0.1", "::1", "box", "box.local", "192.168.1.7", "203.0.113.9"]
 

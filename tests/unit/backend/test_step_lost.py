@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.verify import restless
 from backend.tools.health import run as health
 from backend.tools.health.settings import HealthSettings

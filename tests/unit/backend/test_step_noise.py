@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.gain_steps import judged
 from backend.tools.measuring.recording import Recording
 from backend.tools.step.evaluate import (

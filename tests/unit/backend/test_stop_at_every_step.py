@@ -14,13 +14,13 @@ from pathlib import Path
 
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move
-from backend.work.jobs import JobResult, Progress
 from benchmarks.stopping.clock import run_simulated
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError

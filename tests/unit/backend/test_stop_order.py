@@ -11,12 +11,12 @@ from collections.abc import AsyncIterator
 import httpx
 import pytest
 
-from backend.axis.axis import Envelope
-from backend.axis.stop.facts import StepCode
-from backend.motion.grant import NotGranted
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.stop.facts import StepCode
+from backend.axes.motion.grant import NotGranted
+from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
-from backend.work.jobs import Progress
 from drivers.cia402 import Mode
 from drivers.errors import Rejected
 from drivers.texts.message import text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
 from backend.tools.measuring.waveform import Band, Waveform, stepped, tones_hz
 from backend.tools.sweep.evaluation import Kind, Loop, SweepSettings

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.interrupted import Interrupted

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
@@ -16,7 +17,6 @@ from backend.tools.sweep import play as sweep_play
 from backend.tools.sweep import speed_injection
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.plan import Setup
-from backend.work.jobs import Progress
 from drivers.errors import NotAllowed
 
 ROOM = excite.Room(1.27, 157.0, 25.0)

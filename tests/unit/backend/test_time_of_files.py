@@ -13,11 +13,11 @@ from datetime import UTC, datetime
 
 import pytest
 
-from backend.handover.read import read_list
-from backend.parameters.csv_list import ParameterList
-from backend.parameters.lists import import_list
-from backend.parameters.set_file import BadSet, parse
-from backend.parameters.toml_keys import deepest_key
+from backend.axes.parameters.csv_list import ParameterList
+from backend.axes.parameters.lists import import_list
+from backend.axes.parameters.set_file import BadSet, parse
+from backend.axes.parameters.toml_keys import deepest_key
+from backend.records.handover.read import read_list
 from profiles import load_profile
 from profiles.importer.eds_sections import Section
 

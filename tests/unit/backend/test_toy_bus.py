@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from backend.drive.ports import Port
+from backend.axes.drive.ports import Port
 from backend.station import bench as bench_module
 from backend.station.bench import Bench
 from drivers import urls

@@ -20,16 +20,16 @@ from backend.api.drive.models_motion import (
     SequenceRequest,
 )
 from backend.api.live.messages import JogStart
-from backend.axis.axis import Envelope
-from backend.axis.remembered import AxisRecord
-from backend.motion.travel_unit import REVOLUTIONS, TravelUnit
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.axis.axis import Envelope
+from backend.axes.axis.remembered import AxisRecord
+from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
+from backend.axes.scales.gear_calculator import Mechanics
+from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import _require_inside
 from backend.tools.moves import move as moving
-from backend.work.jobs import Progress
 from drivers.errors import NotAllowed, OutOfRange
 from tests.support.servo import Servo, bench_with
 

@@ -14,7 +14,8 @@ from backend.analysis.loop.design import Candidate
 from backend.analysis.loop.loop_goals import Goals, goals_for
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import again as tune_again
 from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune.again import Again, Designing, Figures, contradictions
@@ -24,7 +25,6 @@ from backend.tools.autotune.present import Present, Trials
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.autotune.verify import MOST_PAIRS, Check
 from backend.tools.measuring.excite import Room, band_for, loop_reference
-from backend.work.jobs import Progress
 from tests.unit.backend.test_tune_hum import GOALS, design
 from tests.unit.backend.test_tune_verify import loop_swept
 

@@ -11,12 +11,12 @@ import pytest
 
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.frf import Frf
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import notches as tune_notches
 from backend.tools.autotune.notches import out_of_sight
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.notch.meaning import NotchMeaning
 from backend.tools.sweep.evaluation import SweepResult
-from backend.work.jobs import Progress
 from drivers.texts.message import Text
 
 

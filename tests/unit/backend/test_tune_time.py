@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import present as tune_present
 from backend.tools.autotune import time_budget as tune_time
 from backend.tools.autotune.apply import Applied
 from backend.tools.autotune.time_budget import TimeLeft
-from backend.work.jobs import Progress
 from tests.unit.backend.test_tune_hum import GOALS, design, kept_of
 
 

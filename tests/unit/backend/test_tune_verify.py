@@ -13,7 +13,8 @@ from backend.analysis.loop.loop_structure import Gains
 from backend.analysis.loop.loop_verdict import Missed
 from backend.analysis.loop.margins import Margins
 from backend.analysis.response.frf import Frf
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import verify as tune_verify
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
@@ -30,7 +31,6 @@ from backend.tools.autotune.verify import (
 )
 from backend.tools.step.evaluate import LEAD_S, StepResult
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings
-from backend.work.jobs import Progress
 
 GUARANTEED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 

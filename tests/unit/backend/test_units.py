@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.scales.units import AxisUnits, ramp_raw, read_units
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.scales.units import AxisUnits, ramp_raw, read_units
 from drivers.errors import NotAllowed, OutOfRange, Rejected
 from drivers.link import Found
 from profiles import load_profile

@@ -6,10 +6,10 @@ import struct
 
 import pytest
 
-from backend.handover.conflicts import Verdict, changed_since, compare, diagnose, resolved
-from backend.handover.listed import ControllerList
-from backend.handover.model import hand_over
-from backend.handover.read import read_list
+from backend.records.handover.conflicts import Verdict, changed_since, compare, diagnose, resolved
+from backend.records.handover.listed import ControllerList
+from backend.records.handover.model import hand_over
+from backend.records.handover.read import read_list
 from profiles import load_profile
 from profiles.schema import Raw
 from tests.unit.handover.test_formats import set_of
@@ -106,7 +106,7 @@ def test_thirty_planted_conflicts_are_all_found_and_none_is_invented() -> None:
 
 @pytest.mark.parametrize("form", ["lcec", "codesys", "csv", "igh", "ros2", "eni", "dcf"])
 def test_every_format_of_the_set_itself_has_no_conflict(form: str) -> None:
-    from backend.handover.files import files_of
+    from backend.records.handover.files import files_of
 
     axis = hand_over(set_of(PROFILE), PROFILE)
     data = files_of(axis, form, "list", None)["list"]  # type: ignore[arg-type]

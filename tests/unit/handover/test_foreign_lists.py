@@ -6,9 +6,9 @@ import struct
 
 import pytest
 
-from backend.handover.conflicts import diagnose
-from backend.handover.read import read_list
-from backend.parameters.set_file import BadSet
+from backend.axes.parameters.set_file import BadSet
+from backend.records.handover.conflicts import diagnose
+from backend.records.handover.read import read_list
 from profiles import load_profile
 
 MMS7, DS_C = load_profile("mms7"), load_profile("ds_c")

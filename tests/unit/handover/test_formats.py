@@ -15,13 +15,13 @@ import pytest
 import yaml
 from defusedxml.ElementTree import fromstring
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.handover.conflicts import resolved
-from backend.handover.files import FORMATS, Format, files_of
-from backend.handover.model import AxisHandover, gain_keys, hand_over
-from backend.handover.read import read_list
-from backend.parameters.set_file import BadSet, ParameterSet, dump, parse, storable
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters.set_file import BadSet, ParameterSet, dump, parse, storable
+from backend.records.handover.conflicts import resolved
+from backend.records.handover.files import FORMATS, Format, files_of
+from backend.records.handover.model import AxisHandover, gain_keys, hand_over
+from backend.records.handover.read import read_list
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from profiles import load_profile

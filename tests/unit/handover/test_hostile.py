@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.handover.read import MAX_BYTES, read_list
-from backend.parameters.set_file import BadSet
+from backend.axes.parameters.set_file import BadSet
+from backend.records.handover.read import MAX_BYTES, read_list
 from profiles import load_profile
 
 BOMB = b"""<?xml version="1.0"?><!DOCTYPE b [<!ENTITY a "aaaaaaaaaa"><!ENTITY c "&a;&a;&a;&a;">]>

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 import yaml
 
-from backend.handover.conflicts import compare
-from backend.handover.files import files_of, fitting
-from backend.handover.model import AxisHandover, write_of
-from backend.handover.read import read_list
+from backend.records.handover.conflicts import compare
+from backend.records.handover.files import files_of, fitting
+from backend.records.handover.model import AxisHandover, write_of
+from backend.records.handover.read import read_list
 from drivers.errors import NotAllowed
 from profiles.importer import export_dcf
 from profiles.importer.report import ImportReport
@@ -115,7 +115,7 @@ def test_a_bus_yml_with_nodes_and_defaults(slave: int, value: int) -> None:
 
 
 def test_a_vendor_of_zero_is_named() -> None:
-    from backend.handover.files import remarks
+    from backend.records.handover.files import remarks
 
     axis = replace(axis_of("mms7"), vendor_id=0)
     assert [note.code for note in remarks([axis], "lcec")] == ["handover.note-no-vendor"]

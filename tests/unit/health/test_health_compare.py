@@ -11,8 +11,9 @@ import math
 import numpy as np
 import pytest
 
-from backend.health.compare import FALSE_ALARMS, compare
 from backend.tools.health.result import HealthRound, HealthValue, Quantity
+from backend.tools.thresholds import trend_compare
+from backend.tools.trend.compare import compare
 from tests.unit.health.drawn_checks import (
     SPREAD,
     Noise,
@@ -38,7 +39,7 @@ def test_at_most_one_false_alarm_in_a_hundred(
     )
     rng, draws = np.random.default_rng(20261123), 2000
     count = sum(bool(alarms(compare(*drawn(rng, noise, 3, {})))) for _ in range(draws))
-    assert count <= FALSE_ALARMS * draws
+    assert count <= trend_compare.FALSE_ALARMS * draws
 
 
 @pytest.mark.parametrize("noise", [normal, heavy, skewed, linked])
@@ -66,7 +67,7 @@ def test_nothing_else_is_blamed() -> None:
     factors: dict[tuple[Quantity, int], float] = {("resonance", 1): math.sqrt(0.7)}
     found = [alarms(compare(*drawn(rng, heavy, 5, factors))) for _ in range(300)]
     others = [each - {("resonance", 1)} for each in found]
-    assert np.mean([bool(each) for each in others]) <= FALSE_ALARMS
+    assert np.mean([bool(each) for each in others]) <= trend_compare.FALSE_ALARMS
 
 
 def one(quantity: Quantity, *values: float, deviation: float = 0.0) -> list[HealthRound]:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from backend.health.permission import (
-    KEPT,
+from backend.foundation.store.files import StorageFailed
+from backend.tools.thresholds import trend_permission
+from backend.tools.trend.permission import (
     Attempt,
     Permission,
     Permissions,
@@ -18,7 +19,6 @@ from backend.health.permission import (
     next_due,
     require_term,
 )
-from backend.store.files import StorageFailed
 from drivers.errors import NotAllowed
 
 MONDAY = datetime(2026, 11, 23, tzinfo=UTC)
@@ -130,5 +130,5 @@ def test_the_newest_attempts_are_kept_and_the_pause_outlives_them() -> None:
     for minute in range(60):
         at = MONDAY + timedelta(minutes=minute)
         found = found.noted(Attempt(at=at, cause="trigger", outcome="not_made"))
-    assert len(found.attempts) == KEPT
+    assert len(found.attempts) == trend_permission.KEPT
     assert found.begun == MONDAY

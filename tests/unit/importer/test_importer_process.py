@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from importer_samples import GOOD_EDS, GOOD_ESI
 
-from backend.handover.esi import controller_of, reported_controllers
-from backend.parameters.set_file import BadSet
+from backend.axes.parameters.set_file import BadSet
+from backend.records.handover.esi import controller_of, reported_controllers
 from backend.station.description import BadDescription, Work, import_in_process
 from drivers.errors import NotAllowed
 from profiles.importer.esi_controller import ControllersTask

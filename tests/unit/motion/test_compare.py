@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from backend.scales.compare import disagreement_of, measured_scale
+from backend.axes.scales.compare import disagreement_of, measured_scale
 from drivers.feedback import Disagreement, FeedbackScale
 from drivers.halt import HaltCause
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from backend.preflight.findings import Code, Effect, findings
-from backend.preflight.texts import _FINDINGS, words
+from backend.foundation.preflight.findings import Code, Effect, findings
+from backend.foundation.preflight.texts import _FINDINGS, words
 from tests.support.computer import ALL, FakeComputer
 
 GOVERNOR = "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor"

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from backend.preflight.findings import Code, Fix, findings
-from backend.preflight.fixes import RESTORE_LIST, Fixes
+from backend.foundation.preflight.findings import Code, Fix, findings
+from backend.foundation.preflight.fixes import RESTORE_LIST, Fixes
 from drivers.computer.host_settings import HostSettings, Setting, command
 from drivers.errors import NotAllowed
 from tests.support.computer import FakeComputer

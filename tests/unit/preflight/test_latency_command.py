@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.commands.server import latency
-from backend.preflight.adapters import Adapters
+from backend.foundation.preflight.adapters import Adapters
 from drivers.computer.latency_timer import LatencyTimers
 from drivers.texts.message import speaking
 

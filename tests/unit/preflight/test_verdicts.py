@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from backend.preflight.findings import Code, Effect, Finding
-from backend.preflight.texts import verdict_words
-from backend.preflight.verdicts import Grade, Purpose, verdicts
+from backend.foundation.preflight.findings import Code, Effect, Finding
+from backend.foundation.preflight.texts import verdict_words
+from backend.foundation.preflight.verdicts import Grade, Purpose, verdicts
 from drivers.computer.lateness import EDGES_US, Histogram, Measured, broadcast_read, missed_bound
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.recording.bundle import build_apart
-from backend.recording.bundle_page import PLOT_HEIGHT, curve
-from backend.recording.evidence import Evidence, Value
-from backend.recording.reader import RecordingReader
+from backend.foundation.work.journal import Entry, Journal
+from backend.records.recording.bundle import build_apart
+from backend.records.recording.bundle_page import PLOT_HEIGHT, curve
+from backend.records.recording.evidence import Evidence, Value
+from backend.records.recording.reader import RecordingReader
 from backend.station.recording import capture
 from backend.station.recording.recorder import Trigger, fires
-from backend.work.journal import Entry, Journal
 from drivers.texts.message import prose
 from tests.unit.recording.support import block, header
 

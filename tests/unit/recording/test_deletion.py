@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from backend.api.library.routes import delete_library_entry
-from backend.library.entries import Query
-from backend.recording.writer import RecordingWriter
+from backend.records.library.entries import Query
+from backend.records.recording.writer import RecordingWriter
 from backend.station.bench import Bench
 from backend.station.recording.service import Recordings
 from drivers.errors import Busy

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend.recording.export import export
-from backend.recording.writer import RecordingWriter
-from backend.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed
+from backend.records.recording.export import export
+from backend.records.recording.writer import RecordingWriter
 from drivers.link import ScopeBlock
 from tests.unit.recording.support import block, header
 

@@ -19,11 +19,11 @@ from typing import BinaryIO
 import numpy as np
 import pytest
 
-from backend.recording import chunks
-from backend.recording import writer as recording_writer
-from backend.recording.reader import BadRecording, RecordingReader
-from backend.recording.writer import RecordingWriter
-from backend.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed
+from backend.records.recording import chunks
+from backend.records.recording import writer as recording_writer
+from backend.records.recording.reader import BadRecording, RecordingReader
+from backend.records.recording.writer import RecordingWriter
 from drivers.errors import NotAllowed
 from drivers.link import ScopeBlock
 from tests.unit.recording.support import block, header
@@ -131,7 +131,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
 _CHILD = """
 import sys, time
 from pathlib import Path
-from backend.recording.writer import RecordingWriter
+from backend.records.recording.writer import RecordingWriter
 from tests.unit.recording.support import block, header
 writer = RecordingWriter(Path(sys.argv[1]), header(), print)
 n = 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.recording.library import RecordingLibrary, Retention
+from backend.records.recording.library import RecordingLibrary, Retention
 
 DAY_S = 86_400.0
 NOW = 1_700_000_000.0

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from backend.scales.gear_calculator import Mechanics
+from backend.axes.scales.gear_calculator import Mechanics
 from backend.scene.geometry import HALF_TRACK, Track, track_of, travel_of, turn
 
 SCREW = Mechanics(kind="screw", lead_mm=10, motor_turns=2, load_turns=1)

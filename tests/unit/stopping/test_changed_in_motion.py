@@ -13,8 +13,8 @@ from datetime import UTC, datetime
 
 import pytest
 
-from backend.drive.readings import Reading
-from backend.parameters import set_file as parameter_set
+from backend.axes.drive.readings import Reading
+from backend.axes.parameters import set_file as parameter_set
 from benchmarks.stopping.cells import STANDS_RPM
 from benchmarks.stopping.clock import run_simulated
 from benchmarks.stopping.motions import jogging, profile_velocity

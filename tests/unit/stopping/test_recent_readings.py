@@ -11,11 +11,11 @@ from typing import cast
 
 import pytest
 
-from backend.axis.stop import braking
-from backend.axis.stop.facts import Verdict
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.stopping.watch import StopWatch
+from backend.axes.axis.stop import braking
+from backend.axes.axis.stop.facts import Verdict
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.stopping.watch import StopWatch
 from tests.support.servo import POSITION, Place, Servo, bench_with
 
 ENABLED = 0x237

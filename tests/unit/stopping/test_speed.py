@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from backend.scales.units import AxisUnits
-from backend.stopping.speed import Sample, SpeedWatch
-from backend.stopping.turning import TurnKind, TurnWatch
+from backend.axes.scales.units import AxisUnits
+from backend.axes.stopping.speed import Sample, SpeedWatch
+from backend.axes.stopping.turning import TurnKind, TurnWatch
 from drivers.cia402 import State
 from profiles.schema import UnitSpec
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from backend.axis.stop.facts import AxisStop, Verdict
-from backend.stopping.stop_message import stop_message
+from backend.axes.axis.stop.facts import AxisStop, Verdict
+from backend.axes.stopping.stop_message import stop_message
 
 MOVING = AxisStop(
     drive="x", verdict=Verdict.STILL_MOVING, took_s=0.3, speed=12.0, speed_unit="rpm",

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from backend.scales.units import AxisUnits
+from backend.axes.scales.units import AxisUnits
 from drivers.virtual.firmware import make_device
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, TravelSpec

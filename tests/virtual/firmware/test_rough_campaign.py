@@ -7,9 +7,9 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from benchmarks._rough_cases import CLASSES, FAMILIES, case_of
 from benchmarks._true_loop import true_loop
 from benchmarks.rough_campaign import Tally, lines_of, table

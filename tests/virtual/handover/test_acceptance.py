@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.handover.files import FORMATS, Format, files_of
+from backend.records.handover.files import FORMATS, Format, files_of
 from drivers.virtual.firmware.factory import make_device
 from tests.support.controllers import text_files, xml_files
 from tests.support.controllers.acceptance import Outcome, axis_of, outcome, table, tuned

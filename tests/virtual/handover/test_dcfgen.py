@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from backend.handover.files import files_of, fitting
+from backend.records.handover.files import files_of, fitting
 from tests.support.controllers.acceptance import axis_of
 from tests.support.controllers.text_files import concise
 from tests.support.handed_over import SAVED

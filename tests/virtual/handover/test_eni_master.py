@@ -13,10 +13,10 @@ from xml.etree.ElementTree import Element
 import pytest
 from defusedxml.ElementTree import fromstring
 
-from backend.handover.eni import eni
-from backend.handover.esi import controller_of
-from backend.handover.model import hand_over
-from backend.parameters.set_file import BadSet
+from backend.axes.parameters.set_file import BadSet
+from backend.records.handover.eni import eni
+from backend.records.handover.esi import controller_of
+from backend.records.handover.model import hand_over
 from drivers.errors import NotAllowed
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, unavailable

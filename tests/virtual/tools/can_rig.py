@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 
 import can
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.tools.sweep import profile_speed
 from drivers.canopen.frames import SYNC, Frame
 from drivers.canopen.link import CanopenLink

@@ -22,10 +22,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.exchange.cyclic import layout, places

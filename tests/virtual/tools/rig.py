@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
-from backend.parameters import set_file as parameter_set
-from backend.work.jobs import Progress
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
+from backend.axes.parameters import set_file as parameter_set
+from backend.foundation.work.jobs import Progress
 from drivers.ethercat.link import EthercatLink
 from drivers.virtual.mechanics import MechanicsSpec, analytic_response
 from drivers.virtual.wires.ethercat.launch import VirtualSegment

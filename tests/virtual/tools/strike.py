@@ -14,6 +14,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.notches import Learning, learn_notches
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
@@ -23,7 +24,6 @@ from backend.tools.measuring.restore import settle
 from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
 from backend.tools.sweep.evaluation import SweepResult, SweepSettings, completed
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Trajectory

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.library.measurements import pack, unpack
+from backend.records.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.measuring.temporary import put_back

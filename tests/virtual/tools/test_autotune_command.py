@@ -17,12 +17,13 @@ from typer.testing import CliRunner
 
 from backend import cli
 from backend.api.app import make_app
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
 from backend.commands.base.remote import Remote
 from backend.commands.measuring import measure, tools
-from backend.drive.drive import Drive
-from backend.library.measurements import unpack
+from backend.foundation.work.jobs import Progress
+from backend.records.library.measurements import unpack
 from backend.station.bench import Bench
 from backend.station.evaluation import recompute
 from backend.tools.autotune import tool
@@ -41,7 +42,6 @@ from backend.tools.inertia.result import InertiaAnswer
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.sweep.result import SweepAnswer
 from backend.tools.wire_message import wire_messages
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.texts.message import prose, text
 from drivers.virtual.firmware.factory import make_device

@@ -193,7 +193,7 @@ async def test_nobody_forces_outputs_meanwhile() -> None:
             drive, name = axis.drive, axis.drive.name
             keys = frozenset({"60FE:01", "60FE:02"})
             try:
-                # As `backend.functions.forcing` asks, from work that holds no grant.
+                # As `backend.axes.functions.forcing` asks, from work that holds no grant.
                 context = contextvars.Context()
                 context.run(
                     lambda: drive.authority.granted(

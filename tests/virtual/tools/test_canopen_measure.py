@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Callable
 import numpy as np
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.inertia.run import inertia
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep.evaluation import SweepSettings

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.recording.writer import RecordingWriter
+from backend.records.recording.writer import RecordingWriter
 from backend.tools.cycle.result import CycleResult
 from backend.tools.cycle.run import TOOL
 from backend.tools.cycle.settings import CycleSettings

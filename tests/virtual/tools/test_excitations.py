@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from backend.library.measurements import pack, unpack
+from backend.records.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
 from backend.tools.measuring.waveform import Waveform
 from backend.tools.sweep.evaluation import Loop, SweepSettings

@@ -17,7 +17,7 @@ import httpx
 import pytest
 
 from backend.api.app import make_app
-from backend.recording.writer import RecordingWriter
+from backend.records.recording.writer import RecordingWriter
 from backend.station.bench import Bench
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.autotune.tool import answer_of

@@ -10,7 +10,7 @@ import contextlib
 
 import pytest
 
-from backend.axis.restoring import RestoreFailed
+from backend.axes.axis.restoring import RestoreFailed
 from backend.tools.measuring.recording import enabled
 from backend.tools.measuring.restore import settle
 from backend.tools.sweep import profile_speed

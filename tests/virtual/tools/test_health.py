@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backend.health.compare import compare
-from backend.health.records import HealthRecords
-from backend.health.words import message_of
-from backend.store.database import Store
+from backend.foundation.store.database import Store
+from backend.tools.trend.compare import compare
+from backend.tools.trend.records import HealthRecords
+from backend.tools.trend.words import message_of
 from drivers.virtual.defects import LOOSE, WORN
 from tests.virtual.tools.set_ups.demo import with_defect
 from tests.virtual.tools.set_ups.health import (

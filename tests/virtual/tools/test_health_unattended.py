@@ -19,15 +19,15 @@ import pytest
 from backend.api.app import make_app
 from backend.api.health.kept import records_of
 from backend.api.health.unattended import Unattended
-from backend.health.permission import WINDOW
-from backend.health.records import axis_of
-from backend.people.station import People
+from backend.foundation.people.station import People
 from backend.station.bench import Bench
 from backend.station.monitor import Snapshot
 from backend.tools.health import run as health_run
 from backend.tools.health.result import HealthRound, HealthValue
 from backend.tools.health.settings import HealthSettings
 from backend.tools.tool import Run
+from backend.tools.trend.permission import WINDOW
+from backend.tools.trend.records import axis_of
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile
@@ -190,14 +190,14 @@ async def enabled(station: Station) -> None:
     async def look(_self: object) -> Any:
         return type("Sample", (), {"state": State.OPERATION_ENABLED})()
 
-    station.patch.setattr("backend.stopping.speed.SpeedWatch.look", look)
+    station.patch.setattr("backend.axes.stopping.speed.SpeedWatch.look", look)
     assert axis.known_units is not None
 
 
 async def turning(station: Station) -> None:
     """By hand, or by what hangs at it."""
     station.patch.setattr(
-        "backend.stopping.speed.SpeedWatch.stands", lambda _self, _dwell=0.0: False
+        "backend.axes.stopping.speed.SpeedWatch.stands", lambda _self, _dwell=0.0: False
     )
 
 

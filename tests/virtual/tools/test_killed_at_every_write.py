@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from backend.axis.cyclic_mode import keeping_mode
+from backend.axes.axis.cyclic_mode import keeping_mode
 from backend.commands.base.restoring import recall
 from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.tools.registry import BY_KIND, TOOLS

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia
 from backend.tools.measuring.alignment import aligned
@@ -15,7 +16,6 @@ from backend.tools.step.evaluate import StepSettings
 from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Address, Trajectory

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.moves import first_look
@@ -20,7 +21,6 @@ from backend.tools.moves.go_back import go_back
 from backend.tools.sweep import run as sweep_tool
 from backend.tools.sweep.evaluation import Loop, SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.link import ScopeBlock, Trajectory
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

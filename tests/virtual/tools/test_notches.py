@@ -13,6 +13,7 @@ from backend.analysis.loop.loop_structure import Gains
 from backend.analysis.loop.margins import open_from_closed
 from backend.analysis.loop.notch import Notch
 from backend.analysis.response.sampling import Hold
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.gains import plan_gains
 from backend.tools.measuring import excite
@@ -22,7 +23,6 @@ from backend.tools.notch import filters as notch
 from backend.tools.notch.meaning import meaning_of, remember
 from backend.tools.sweep.evaluation import SweepSettings, completed
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia
 from backend.tools.measuring.interrupted import Interrupted
@@ -22,7 +23,6 @@ from backend.tools.measuring.restore import settle
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.device import Device

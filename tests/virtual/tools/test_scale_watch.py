@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from backend.axis import teaching
-from backend.axis.axis import Envelope
-from backend.scales.scale import Origin, ScaleUnknown, Uncertainty
+from backend.axes.axis import teaching
+from backend.axes.axis.axis import Envelope
+from backend.axes.scales.scale import Origin, ScaleUnknown, Uncertainty
 from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.inertia.run import inertia

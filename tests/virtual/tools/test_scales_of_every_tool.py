@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from backend.axis import scaled, teaching
-from backend.scales.scale import ScaleChanged, ScaleUnknown
+from backend.axes.axis import scaled, teaching
+from backend.axes.scales.scale import ScaleChanged, ScaleUnknown
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.measuring.recording import enabled
 from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move

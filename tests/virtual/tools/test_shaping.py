@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.axis.axis import Axis
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.tools.shaping.run import TOOL
 from backend.tools.tool import Run
 from drivers.cia402 import State

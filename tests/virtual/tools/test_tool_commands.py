@@ -24,7 +24,7 @@ from backend.analysis.mechanics.inertia import InertiaResult, Interval
 from backend.api.app import make_app
 from backend.api.audit.audited import REPORTED_THERE
 from backend.api.security.rights import ROUTES
-from backend.axis.axis import Axis
+from backend.axes.axis.axis import Axis
 from backend.commands.base import session
 from backend.commands.base.remote import Remote
 from backend.commands.measuring import measure, report

@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import pytest
 
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.cyclic import CyclicSession
+from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.restore import settle
 from backend.tools.sweep import profile_speed
 from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from drivers.virtual.wires.netns import Namespace

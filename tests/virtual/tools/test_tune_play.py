@@ -13,13 +13,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import again as tune_again
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
 from backend.tools.autotune.tool import answer_of
 from backend.tools.measuring.temporary import put_back
 from backend.tools.sweep.evaluation import completed
-from backend.work.jobs import Progress
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, At, mechanics, settings_of, silent
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
+from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.run import (
     AutotuneResult,
@@ -32,7 +33,6 @@ from backend.tools.step.evaluate import StepSettings
 from backend.tools.step.run import step_response
 from backend.tools.sweep.evaluation import SweepSettings, completed
 from backend.tools.sweep.run import sweep
-from backend.work.jobs import Progress
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import Address

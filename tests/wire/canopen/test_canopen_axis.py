@@ -10,10 +10,10 @@ from collections.abc import AsyncIterator
 import can
 import pytest
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog

@@ -12,9 +12,9 @@ from pathlib import Path
 import canopen
 import pytest
 
-from backend.handover.files import files_of
-from backend.handover.model import AxisHandover, hand_over
-from backend.parameters.set_file import ParameterSet
+from backend.axes.parameters.set_file import ParameterSet
+from backend.records.handover.files import files_of
+from backend.records.handover.model import AxisHandover, hand_over
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.canopen import CanopenNode

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from backend.axis.axis import Axis, Envelope
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis, Envelope
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.release import END_OF_JOG

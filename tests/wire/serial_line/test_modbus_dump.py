@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from profiles import load_profile
 
 from .conftest import OpenLink

@@ -9,16 +9,16 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from backend.axis.stop.facts import StepCode
-from backend.axis.stop.settings import OPTION, braking_option, known_settings
-from backend.drive.drive import Drive
+from backend.axes.axis.stop.facts import StepCode
+from backend.axes.axis.stop.settings import OPTION, braking_option, known_settings
+from backend.axes.drive.drive import Drive
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
 from drivers.texts.message import Text, text
 
 if TYPE_CHECKING:
-    from backend.axis.power import PowerState
+    from backend.axes.axis.power import PowerState
 
 #: Greatest age of a reading that counts as the present state [s].
 _SEEN_S = 2.5

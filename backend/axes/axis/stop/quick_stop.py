@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.axis.stop.settings import COAST, OPTION, braking_option
-from backend.drive.drive import Drive
-from backend.drive.optional import existing
-from backend.scales.units import AxisUnits
+from backend.axes.axis.stop.settings import COAST, OPTION, braking_option
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.optional import existing
+from backend.axes.scales.units import AxisUnits
 from profiles.schema import Parameter, Raw
 
 #: Time from any permitted speed to standstill [s], as `drivers.motion.playback` ramps down.

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from backend.drive.drive import Drive
-from backend.drive.readings import Reading
-from backend.scales.units import AxisUnits
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.readings import Reading
+from backend.axes.scales.units import AxisUnits
 
 OPTION, HALT_OPTION = "605A:00", "605D:00"
 COAST = 0

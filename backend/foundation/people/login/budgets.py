@@ -2,8 +2,8 @@
 
 Guessing is slowed down; guesses by others do not lock out a person who knows the password:
 
-- A browser that has logged in to an account before (`backend.people.login.devices`) has a budget of
-  its own for that account.
+- A browser that has logged in to an account before (`devices`) has a budget of its own for that
+  account.
 - Every other client has a budget for each name from each address. Wrong tries from other addresses
   only reduce it, down to one try at a time: the first try of an address is never refused.
 """
@@ -13,9 +13,9 @@ from __future__ import annotations
 import hashlib
 import ipaddress
 
-from backend.people.credentials import name_key
-from backend.people.errors import TooOften
-from backend.people.throttle import Throttle
+from backend.foundation.people.credentials import name_key
+from backend.foundation.people.errors import TooOften
+from backend.foundation.people.throttle import Throttle
 
 #: Wrong tries before waits begin: of a name from one address, or from a known browser.
 FREE = 5

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.store.files import write_atomically
+from backend.foundation.store.files import write_atomically
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 

@@ -16,7 +16,7 @@ from collections import OrderedDict, deque
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from backend.people.errors import TooOften
+from backend.foundation.people.errors import TooOften
 
 #: Limits of the queue: clients of one place, and places.
 MOST_OF_PLACE, MOST_PLACES = 3, 64

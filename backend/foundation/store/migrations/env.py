@@ -1,9 +1,9 @@
-"""Alembic environment, run for every upgrade; the connection comes from backend.store.database."""
+"""Alembic environment, run for every upgrade; the connection comes from `Store`."""
 
 from alembic import context
 from sqlalchemy import Connection
 
-from backend.store.base import Base
+from backend.foundation.store.base import Base
 
 connection = context.config.attributes["connection"]
 if not isinstance(connection, Connection):

@@ -21,10 +21,10 @@ from pathlib import Path, PurePosixPath
 from typing import IO, BinaryIO
 
 import backend
-from backend.audit.trail import Trail
-from backend.library.backup.copy import copy_rows
-from backend.store.database import FILE, Store
-from backend.store.files import StorageFailed
+from backend.foundation.store.database import FILE, Store
+from backend.foundation.store.files import StorageFailed
+from backend.records.audit.trail import Trail
+from backend.records.library.backup.copy import copy_rows
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 from profiles.replacing import move_into_place

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 from sqlalchemy import Table, func, insert, select
 from sqlalchemy.orm import Session
 
-from backend.audit.chain import ZERO
-from backend.store.audit_tables import AuditEntry, AuditHead
-from backend.store.base import Base
-from backend.store.database import Store
-from backend.store.health_tables import HealthBaseline, HealthRun
-from backend.store.library_tables import Content, Item, Tag, Version
+from backend.foundation.store.audit_tables import AuditEntry, AuditHead
+from backend.foundation.store.base import Base
+from backend.foundation.store.database import Store
+from backend.foundation.store.health_tables import HealthBaseline, HealthRun
+from backend.foundation.store.library_tables import Content, Item, Tag, Version
+from backend.records.audit.chain import ZERO
 from drivers.errors import NotAllowed
 
 #: Tables in the order in which they can be filled.

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from backend.audit.trail import Trail
-from backend.library.backup import backup
-from backend.library.backup.backup import SHARED, BackupFailed
-from backend.library.backup.copy import copy_rows
-from backend.store import state_version
-from backend.store.database import FILE, Store
-from backend.store.files import StorageFailed
-from backend.store.lock import FolderLock
+from backend.foundation.store import state_version
+from backend.foundation.store.database import FILE, Store
+from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.lock import FolderLock
+from backend.records.audit.trail import Trail
+from backend.records.library.backup import backup
+from backend.records.library.backup.backup import SHARED, BackupFailed
+from backend.records.library.backup.copy import copy_rows
 from drivers.computer.files import FOLDERS_MOVE_WHILE_OPEN
 
 

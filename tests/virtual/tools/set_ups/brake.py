@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
 from backend.tools.brake.result import BrakeResult
 from backend.tools.brake.run import TOOL
 from backend.tools.brake.settings import BrakeSettings

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from backend.axis.axis import Envelope
+from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.inertia.moves import speed_move
 from drivers.virtual.mechanics import MechanicsSpec

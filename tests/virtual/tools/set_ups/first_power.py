@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from backend.axis.cyclic_mode import keeping_mode
+from backend.axes.axis.cyclic_mode import keeping_mode
 from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.first_power.run import TOOL
 from backend.tools.first_power.settings import FirstPowerSettings

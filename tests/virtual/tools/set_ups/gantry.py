@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from backend.axis.axis import Axis
-from backend.axis.cyclic import CyclicSession
-from backend.drive.drive import Drive
-from backend.drive.ports import Port
+from backend.axes.axis.axis import Axis
+from backend.axes.axis.cyclic import CyclicSession
+from backend.axes.drive.drive import Drive
+from backend.axes.drive.ports import Port
 from backend.tools.gantry.result import GantryResult
 from backend.tools.gantry.run import TOOL
 from backend.tools.gantry.settings import GantrySettings

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from backend.axis.cyclic_mode import keeping_mode
+from backend.axes.axis.cyclic_mode import keeping_mode
 from backend.tools.safety_check.result import SafetyResult
 from backend.tools.safety_check.run import TOOL
 from backend.tools.safety_check.settings import SafetySettings

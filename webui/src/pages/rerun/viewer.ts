@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react'
 
-/** What the viewer's frame shows (backend/recording/viewer/viewer.js). */
+/** What the viewer's frame shows (backend/records/recording/viewer/viewer.js). */
 export interface ViewerState {
   phase: 'loading' | 'started' | 'live' | 'stored' | 'lost' | 'broken'
   fraction: number

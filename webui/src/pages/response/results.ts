@@ -45,7 +45,7 @@ export type Sweep = Pick<
     axis?: ImportedAxis | null
   }
 
-/** How a recording of another program was evaluated (backend/response_import/evaluation.py). */
+/** How a recording of another program was evaluated (backend/records/response_import/evaluation.py). */
 export interface ImportedFacts {
   excitation: 'periodic' | 'chirp' | 'noise'
   method: string

@@ -4,7 +4,7 @@ import type { Samples } from '../../live/worker-messages'
 
 const MAGIC = 'SDSNAP1\n'
 
-/** A snapshot as a file (layout: backend/scope/stored.py). */
+/** A snapshot as a file (layout: backend/axes/scope/stored.py). */
 export function packSnapshot(
   head: { notes: string; origin_s: number; setup: ScopeSetup; created: string },
   traces: Omit<SnapshotTrace, 'rows'>[],

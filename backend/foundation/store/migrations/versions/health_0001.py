@@ -3,7 +3,7 @@
 import sqlalchemy as sa
 from alembic import op
 
-from backend.store.base import UtcDateTime
+from backend.foundation.store.base import UtcDateTime
 
 revision = "health_0001"
 down_revision = None

@@ -1,0 +1,1 @@
+"""Axes and their drives: identity, values, scales, motion authority, power, STOP, scope."""

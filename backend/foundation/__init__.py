@@ -1,0 +1,1 @@
+"""What every other room uses: database and files, people and their rights, jobs, this computer."""
