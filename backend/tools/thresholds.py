@@ -79,7 +79,7 @@ class autotune_gain_steps:
     """[count] Fewer samples than this in a piece show no bands. Origin: d16e3511."""
     RECEIVED = 0.9
     """[ratio] Share of the samples of a steady part without which nothing is concluded from it:
-    a gap of 12 ms may hide an oscillation. Origin: tests/unit/backend/test_gain_steps_lost.py."""
+    a gap of 12 ms may hide an oscillation. Origin: test_gain_steps_lost.py."""
     FALSE_ALARM = 1e-3
     """[ratio] Noise passes for growth in one of so many steps at most, over all bands of a spectrum
     together. Origin: d16e3511."""
@@ -103,7 +103,7 @@ class autotune_gains:
     """[s] Origin: 66bd184e with benchmarks/tune_accuracy."""
     MORE = 1.05
     """[ratio] By so much a gain may exceed its design where a raw value is rounded: 0.4 dB of the
-    1.5 dB that a design has in reserve. Origin: tests/unit/backend/test_loop_gains.py."""
+    1.5 dB that a design has in reserve. Origin: test_loop_gains.py."""
     LOOP_PERIOD_S = 50e-6
     """[s] Loop period of the drives: half of it to compute, half of it until the torque's mean
     follows. Origin: e01bb3d6."""
@@ -461,9 +461,9 @@ class inertia_evaluation:
     # LOOP_EXPLAINED, LOOP_LATEST: A speed loop whose gains explain this share of the torque is
     # seen; its torque follows its error by fewer than so many cycles.
     LOOP_EXPLAINED = 0.9
-    """[ratio] Origin: tests/unit/backend/test_inertia_sampled.py."""
+    """[ratio] Origin: test_inertia_sampled.py."""
     LOOP_LATEST = 6
-    """[count] Origin: tests/unit/backend/test_inertia_sampled.py."""
+    """[count] Origin: test_inertia_sampled.py."""
 
 
 class inertia_moves:
@@ -546,9 +546,9 @@ class inertia_probe:
     # Simulated: 0.7 to 1 for rigid axes, down to -0.2 for 12 times the motor on a coupling of 2 to
     # 8 Hz.
     RIGID = 0.25
-    """[ratio] Origin: tests/unit/backend/test_probe_judged.py."""
+    """[ratio] Origin: test_probe_judged.py."""
     AGAINST = 0.5
-    """[ratio] Origin: tests/unit/backend/test_probe_judged.py."""
+    """[ratio] Origin: test_probe_judged.py."""
     SMOOTHED_S = 0.02
     """[s] A motion of some tenths of a second, a mean over so many seconds of which hides nothing.
     Origin: dc38bcd8."""
@@ -1122,7 +1122,7 @@ class step_evaluate:
     """[s] Rest before the step. Origin: 66bd184e with benchmarks/tune_accuracy."""
     GAP_S = 0.003
     """[s] Longest gap in the samples that hides no peak and no departure from the window: a loop
-    of 100 Hz overshoots for 5 ms. Origin: tests/unit/backend/test_step_lost.py."""
+    of 100 Hz overshoots for 5 ms. Origin: test_step_lost.py."""
 
 
 class sweep_evaluation:

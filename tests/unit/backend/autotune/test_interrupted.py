@@ -21,7 +21,7 @@ from backend.tools.measuring.interrupted import Interrupted, raise_if_ended
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, MotionHalted, NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, LoopState
-from tests.unit.backend.test_tune_hum import GOALS, design
+from tests.unit.backend.autotune.test_tune_hum import GOALS, design
 
 STOPPED = Interrupted("station 1: the drive left Operation enabled: Quick stop active")
 LOST = LinkLost("only 12 of 800 samples were received from the bus")

@@ -26,7 +26,7 @@ from backend.tools.notch import effect as notch_effect
 from backend.tools.sweep import play as sweep_play
 from drivers.errors import NotAllowed
 from profiles.loader import load_profile
-from tests.unit.backend.test_tune_time import Clock
+from tests.unit.backend.autotune.test_tune_time import Clock
 
 NOTHING: Any = None
 

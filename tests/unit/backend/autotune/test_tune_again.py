@@ -25,8 +25,8 @@ from backend.tools.autotune.present import Present, Trials
 from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.autotune.verify import MOST_PAIRS, Check
 from backend.tools.measuring.excite import Room, band_for, loop_reference
-from tests.unit.backend.test_tune_hum import GOALS, design
-from tests.unit.backend.test_tune_verify import loop_swept
+from tests.unit.backend.autotune.test_tune_hum import GOALS, design
+from tests.unit.backend.autotune.test_tune_verify import loop_swept
 
 FIRST, SECOND = Figures(137.0, 52.0, 11.0), Figures(118.0, 61.0, 11.5)
 #: Raw values: of the axis as it was, and of the design.

@@ -14,7 +14,7 @@ from backend.tools.autotune import apply as tune_apply
 from backend.tools.autotune import present as tune_present
 from backend.tools.autotune.apply import Applied
 from drivers.texts.message import Text
-from tests.unit.backend.test_tune_hum import GOALS, design
+from tests.unit.backend.autotune.test_tune_hum import GOALS, design
 
 #: Raw values: of the axis as it was, and of the design.
 WAS, NEW = {"2005:03": 700}, {"2005:03": 200}

@@ -13,7 +13,7 @@ from backend.tools.autotune import present as tune_present
 from backend.tools.autotune import time_budget as tune_time
 from backend.tools.autotune.apply import Applied
 from backend.tools.autotune.time_budget import TimeLeft
-from tests.unit.backend.test_tune_hum import GOALS, design, kept_of
+from tests.unit.backend.autotune.test_tune_hum import GOALS, design, kept_of
 
 
 @dataclass

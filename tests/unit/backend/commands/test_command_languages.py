@@ -12,7 +12,7 @@ import pytest
 
 from backend import __version__
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 _WORDS = re.compile(r"[A-Za-z]{2,} [A-Za-z]{2,}")
 
 

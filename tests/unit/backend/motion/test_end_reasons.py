@@ -42,7 +42,7 @@ from drivers.texts.message import Language, Text, prose, speaking, text
 from drivers.texts.profile_errors import profile_error_text
 from profiles.loader import ProfileError, drive_names, load_all, parse_profile
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 CHINESE = re.compile(r"[\u4e00-\u9fff]")
 
 

@@ -249,7 +249,7 @@ async def test_commands_are_no_settings() -> None:
 
 # --- nothing goes past it ---------------------------------------------------------------
 
-ROOT = Path(__file__).resolve().parents[3] / "backend"
+ROOT = Path(__file__).resolve().parents[4] / "backend"
 #: Who may call the loop or write to a link past `Drive`, and why.
 ALLOWED = {
     "drive_to": {"axes/axis/loop.py"},

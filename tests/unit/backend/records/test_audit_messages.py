@@ -27,7 +27,7 @@ from drivers.errors import OutOfRange
 from drivers.texts.message import Text, prose, text
 from tests.support.station import until
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 BEYOND = {"name": "rpm", "highest": 5000.0, "travelled_rev": 1.0, "speed_rpm": 300.0}
 
 

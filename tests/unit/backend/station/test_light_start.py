@@ -11,7 +11,7 @@ from pathlib import Path
 
 from backend.commands.server.serve import LATE
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 #: Each takes from a tenth of a second to a second of processor time to load.
 HEAVY = (
     "matplotlib", "PIL", "reportlab", "rerun", "scipy.fft", "scipy.linalg", "scipy.ndimage",
