@@ -19,7 +19,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from backend.station.service import systemd_unit
+from backend.station.install.service import systemd_unit
 
 PROGRAM = "opt/servodeck"
 UNIT = "usr/lib/systemd/system/servodeck.service"

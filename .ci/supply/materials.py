@@ -31,7 +31,7 @@ _LICENCE_FILES = re.compile(r"(licen[cs]e|copying|notice)(\.|-|$)", re.IGNORECAS
 
 #: Files in the repository that others have written.
 VENDORED = (
-    ("DejaVu fonts 2.37", "Bitstream-Vera", "backend/report/fonts/LICENSE-DejaVu.txt"),
+    ("DejaVu fonts 2.37", "Bitstream-Vera", "backend/report/render/fonts/LICENSE-DejaVu.txt"),
     ("Droid Sans Fallback (Android 6.0.1), © 2006-2010 Google Corp.", "Apache-2.0", "LICENSE"),
 )
 #: What classifiers and free texts of packages mean, where they give no expression.

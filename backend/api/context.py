@@ -15,7 +15,7 @@ from backend.foundation.people.errors import NotLoggedIn
 from backend.foundation.people.identity import Identity, acting
 from backend.foundation.people.station import People
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 
 #: Header that the page sends with every change: the id of its live connection, which

@@ -19,9 +19,9 @@ from backend.foundation.people.elapsed import moment_of
 from backend.foundation.work.jobs import Job
 from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
-from backend.station.matching import match_profiles
-from backend.station.monitor import Snapshot
+from backend.station.drives.connected_drive import ConnectedDrive
+from backend.station.drives.matching import match_profiles
+from backend.station.drives.monitor import Snapshot
 from backend.tools.moves.procedures import describe
 from backend.tools.spoken import result_in_language
 from drivers import cia402

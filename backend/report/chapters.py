@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from backend.report.document import Block, Figure, Heading, Note, Table
 from backend.report.facts import Measured
 from backend.report.loop_bands import bands
-from backend.report.plot import Curve, Plot
+from backend.report.render.plot import Curve, Plot
 from backend.report.texts import Words
 from backend.report.tools import grid_table, kind_title, note_of, tool_blocks
 from backend.tools.measuring.numbers import fixed, milliseconds, moment, significant

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.report.plot import Plot
+from backend.report.render.plot import Plot
 
 Tone = Literal["plain", "good", "warn", "fault"]
 Language = Literal["en", "zh"]

@@ -20,7 +20,7 @@ from backend.report.changes import Change, net
 from backend.report.facts import ChangedSetting, Facts, HandedOverFile, Identity, Measured
 from backend.report.tools import result_of, verdict_of
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.evaluation import evaluate
 from backend.tools.registry import TOOLS
 from drivers.errors import DriveError, NotAllowed

@@ -11,7 +11,7 @@ from backend.foundation.store.files import checked_name, files_of, shown_name, w
 from backend.report.compose import compose
 from backend.report.document import Language
 from backend.report.facts import Facts
-from backend.report.html import render_html
+from backend.report.render.html import render_html
 from drivers.errors import NotAllowed
 
 Format = Literal["html", "pdf"]
@@ -25,7 +25,7 @@ def render(facts: Facts, language: Language, form: Format) -> bytes:
     if form == "html":
         return render_html(document)
     # Imported by the first PDF, or by a server after its start (`backend.commands.server.serve`).
-    from backend.report.pdf import render_pdf
+    from backend.report.render.pdf import render_pdf
 
     return render_pdf(document)
 

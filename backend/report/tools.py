@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from backend.records.library.measurements import BadMeasurement
 from backend.report.document import Block, Figure, Note, Table
-from backend.report.plot import Curve, Plot
+from backend.report.render.plot import Curve, Plot
 from backend.report.texts import Words
 from backend.tools.autotune.result import VerdictInfo
 from backend.tools.measuring.numbers import NONE, significant

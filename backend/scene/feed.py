@@ -15,7 +15,7 @@ from backend.axes.scales.units import AxisUnits
 from backend.axes.scope.hub import Subscription
 from backend.scene.geometry import Track, Travel, track_of, travel_of
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import ScopeBlock

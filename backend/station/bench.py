@@ -28,15 +28,15 @@ from backend.foundation.work.journal import Journal, Level
 from backend.records.audit.recorder import AuditRecorder
 from backend.records.library.measurements import MeasurementStore
 from backend.station.buses import Buses
-from backend.station.connected_drive import ConnectedDrive
 from backend.station.doctor import Doctor
-from backend.station.drive_list import DriveList, SavedDrive, SavedPort
+from backend.station.drives.connected_drive import ConnectedDrive
+from backend.station.drives.drive_list import DriveList, SavedDrive, SavedPort
+from backend.station.drives.matching import profile_for
+from backend.station.drives.monitor import Monitor, Snapshot
+from backend.station.drives.naming import PlaceNames, new_id
+from backend.station.drives.reconnection import Reconnection
 from backend.station.exchanges import Exchanges
-from backend.station.matching import profile_for
-from backend.station.monitor import Monitor, Snapshot
 from backend.station.motion import Motion
-from backend.station.naming import PlaceNames, new_id
-from backend.station.reconnection import Reconnection
 from backend.station.records import Records
 from drivers.errors import Busy, DriveError, NotAllowed, why_of
 from drivers.link import Found, Link

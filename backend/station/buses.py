@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.foundation.people.identity import by_itself
-from backend.station.box.roles import require_not_office
+from backend.station.install.box.roles import require_not_office
 from drivers.errors import Busy, NotAllowed
 from drivers.link import Found, Link, LinkEvent
 from drivers.texts.message import Text, text

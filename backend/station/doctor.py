@@ -23,7 +23,7 @@ from profiles.schema import DataType, Profile
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
-    from backend.station.connected_drive import ConnectedDrive
+    from backend.station.drives.connected_drive import ConnectedDrive
 
 _INPUTS: tuple[tuple[int, DataType], ...] = ((0x6041, "UINT16"), (0x6064, "INT32"))
 _OUTPUTS: tuple[tuple[int, DataType], ...] = ((0x6040, "UINT16"),)

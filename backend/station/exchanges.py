@@ -14,7 +14,7 @@ from drivers.texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
-    from backend.station.connected_drive import ConnectedDrive
+    from backend.station.drives.connected_drive import ConnectedDrive
 
 
 class Exchanges:

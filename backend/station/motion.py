@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from backend.axes.axis.stop.facts import AxisStop, Verdict
 from backend.axes.stopping.stop_message import stop_message
 from backend.axes.stopping.watch import StopWatch
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, internal_error
 from drivers.texts.message import Text, text

@@ -37,7 +37,7 @@ import uvicorn  # noqa: E402
 from argon2 import PasswordHasher  # noqa: E402
 
 from backend.commands.server.serve import Serving, _config, _listen  # noqa: E402
-from backend.foundation.people.passwords import Passwords  # noqa: E402
+from backend.foundation.people.login.passwords import Passwords  # noqa: E402
 from backend.foundation.people.rights import Role  # noqa: E402
 from backend.foundation.people.station import People  # noqa: E402
 from backend.station.bench import Bench  # noqa: E402

@@ -15,7 +15,7 @@ import httpx
 
 from backend.api.app import make_app
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import LinkTimeout
 from drivers.link import Address
 from drivers.virtual.device import Device

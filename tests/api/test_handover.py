@@ -19,7 +19,7 @@ from backend.api.handover import routes
 from backend.cli import app
 from backend.records.handover.read import MAX_BYTES
 from backend.station.demo import DemoBench
-from backend.station.description import import_in_process
+from backend.station.drives.description import import_in_process
 from tests.support.station import Station
 
 runner = CliRunner()

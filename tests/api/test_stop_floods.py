@@ -21,7 +21,7 @@ import pytest
 from argon2 import PasswordHasher
 
 from backend.commands.server.serve import settle
-from backend.foundation.people.passwords import DEFAULT
+from backend.foundation.people.login.passwords import DEFAULT
 from backend.foundation.people.rights import Role
 from tests.support import flood
 from tests.support.guarded import Caller, GuardedServer

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from backend.api.station.box import routes
 from backend.foundation.people.station import People
-from backend.station.box.kept import Box, read
+from backend.station.install.box.kept import Box, read
 from drivers.computer.interfaces import Interface
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
 from tests.support.guarded import CHEAP, PASSWORD

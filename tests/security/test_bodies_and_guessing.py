@@ -16,9 +16,9 @@ from argon2 import PasswordHasher
 
 from backend.api.security import body as security_body
 from backend.api.security import protocol as security_protocol
-from backend.foundation.people.passwords import DEFAULT, Passwords
+from backend.foundation.people.login.passwords import DEFAULT, Passwords
+from backend.foundation.people.login.throttle import LONGEST_WAIT_S, Throttle
 from backend.foundation.people.rights import Right, Role
-from backend.foundation.people.throttle import LONGEST_WAIT_S, Throttle
 from tests.security.conftest import Cast
 from tests.support.guarded import NAMES, PASSWORD, Caller, GuardedServer
 from tests.support.station import until

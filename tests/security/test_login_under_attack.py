@@ -19,9 +19,9 @@ from backend.api.admission.requests import (
     MOST_OF_STRANGERS,
     Admission,
 )
-from backend.foundation.people.credentials import name_key
 from backend.foundation.people.errors import NotLoggedIn, TooOften
 from backend.foundation.people.login.budgets import CROWDED, FREE, LoginBudgets, address_group
+from backend.foundation.people.login.credentials import name_key
 from backend.foundation.people.login.devices import KnownDevices
 from backend.foundation.people.login.turns import MOST_OF_PLACE as MOST_WAITING
 from backend.foundation.people.login.turns import MOST_PLACES, HashTurns

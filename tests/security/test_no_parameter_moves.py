@@ -23,7 +23,7 @@ from backend.commands.base.options import Place
 from backend.commands.drive import local_params, remote_params
 from backend.foundation.people.rights import Right, Role
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from profiles.schema import LinkKind, Parameter, Profile, Raw

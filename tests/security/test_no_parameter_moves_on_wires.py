@@ -20,8 +20,8 @@ import pytest
 
 from backend.foundation.people.rights import Right, Role
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
 from backend.station.demo import DemoBench
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.errors import LinkTimeout

@@ -24,7 +24,7 @@ from backend.records.library import Library
 from backend.records.library.backup.backup import make_backup
 from backend.records.library.backup.restore import restore
 from backend.records.library.entries import Addition, Query
-from backend.station.drive_list import DriveList
+from backend.station.drives.drive_list import DriveList
 from backend.station.records import Records
 from drivers.errors import Busy
 

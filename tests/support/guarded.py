@@ -16,12 +16,12 @@ from argon2 import PasswordHasher
 
 from backend.commands.server.serve import Serving, _config, _listen
 from backend.foundation.people.identity import Actor, Identity, acting
-from backend.foundation.people.passwords import Passwords
+from backend.foundation.people.login.passwords import Passwords
 from backend.foundation.people.rights import Right, Role
 from backend.foundation.people.station import People
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from tests.support.servo import Servo, bench_with
 from tests.support.station import HANG_S, NO_CERTIFICATES, Live, until
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 
 from backend.foundation.people.errors import TooOften
 from backend.foundation.people.login.budgets import address_group
-from backend.foundation.people.throttle import Bucket
+from backend.foundation.people.login.throttle import Bucket
 
 #: Requests in progress at once: all but STOP, those of unknown clients, and
 #: of these from one address.

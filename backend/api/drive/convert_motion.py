@@ -13,7 +13,7 @@ from backend.axes.axis.axis import Envelope
 from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.axes.scales.travel_units import travel_unit
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import GeneratorSettings
 from backend.tools.jog.run import JogSettings
 from backend.tools.moves.homing import HomingSettings

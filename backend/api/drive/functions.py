@@ -35,7 +35,7 @@ from backend.axes.functions import gear, regeneration
 from backend.axes.scales.gear_calculator import GearPlan, Mechanics
 from backend.axes.scales.units import gentlest_ramp_rpm_s
 from backend.records.audit.asked import note_before
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.moves import identification
 from drivers.errors import DriveError
 from drivers.texts.message import text

@@ -42,7 +42,7 @@ from backend.axes.functions.assign import assign
 from backend.axes.motion.classes import held_still, motion_of
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools import parameters
 from backend.tools.jog import cyclic as cyclic_motion
 from backend.tools.moves import homing, move, procedures

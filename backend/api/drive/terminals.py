@@ -24,7 +24,7 @@ from backend.axes.drive import terminals as io_functions
 from backend.axes.drive.catalog import functions_of
 from backend.axes.drive.terminals import ProbeSettings, TerminalState
 from backend.axes.functions.forcing import ForcingSession, ForcingSessions
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.texts.message import Text, joined, text
 from profiles.functions import Forcing, TerminalFacts
 

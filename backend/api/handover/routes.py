@@ -46,7 +46,7 @@ from backend.records.handover.model import AxisHandover, hand_over
 from backend.records.handover.read import MAX_BYTES, read_list
 from backend.records.handover.record import HandedOver, HandoverLog
 from backend.station.bench import Bench
-from backend.station.description import import_in_process
+from backend.station.drives.description import import_in_process
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
 from profiles.importer.esi_controller import ControllersTask

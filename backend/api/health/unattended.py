@@ -22,7 +22,7 @@ from backend.foundation.people.station import People
 from backend.foundation.store.files import StorageFailed
 from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.health.settings import HealthSettings
 from backend.tools.registry import BY_KIND
 from backend.tools.thresholds import trend_compare

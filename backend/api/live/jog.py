@@ -9,7 +9,7 @@ from backend.api.errors import message_or_none, problem_of, words_of
 from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart, ToPage
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.hold import Hold
 from backend.tools.jog.run import jog

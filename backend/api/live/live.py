@@ -20,7 +20,7 @@ from backend.foundation.people.station import People
 from backend.foundation.work.jobs import Job
 from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
-from backend.station.monitor import Snapshot
+from backend.station.drives.monitor import Snapshot
 from drivers.texts.message import text
 
 

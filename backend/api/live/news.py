@@ -6,7 +6,7 @@ from backend.api import convert
 from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ToPage, ValuesChanged
 from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
-from backend.station.monitor import Snapshot
+from backend.station.drives.monitor import Snapshot
 
 
 def state(bench: Bench, drive: str, snapshot: Snapshot) -> ToPage | None:

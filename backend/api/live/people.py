@@ -32,8 +32,8 @@ from backend.api.live.watch import SILENT_END_S, PeopleWatch
 from backend.api.people.record import PeopleRecord
 from backend.foundation.people.errors import Forbidden, TooOften
 from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.throttle import Bucket
 from backend.foundation.people.station import People
-from backend.foundation.people.throttle import Bucket
 from backend.station.bench import Bench
 from backend.tools.jog.release import END_OF_ENABLING, end_of_enabling
 from drivers.texts.message import prose, text

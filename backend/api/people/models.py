@@ -9,11 +9,11 @@ from pydantic import Field
 
 from backend.api.live.people_messages import ChatLine, InvitationView, PersonHere
 from backend.api.models import Message
-from backend.foundation.people.passwords import MAX_LENGTH
+from backend.foundation.people.login.passwords import MAX_LENGTH
 from backend.foundation.people.rights import Right, Role
 
 PersonName = Annotated[str, Field(min_length=1, max_length=60)]
-#: Checked by `backend.foundation.people.passwords`; only its length is limited here.
+#: Checked by `backend.foundation.people.login.passwords`; only its length is limited here.
 Password = Annotated[str, Field(min_length=1, max_length=MAX_LENGTH)]
 Code = Annotated[str, Field(min_length=1, max_length=40)]
 

@@ -32,10 +32,10 @@ from backend.api.security.body import BodyRefused, MeasuredBody, framing, is_jso
 from backend.api.security.origin import Addresses, header
 from backend.api.security.rights import Matched, Policy
 from backend.api.security.socket import GuardedSocket, OpenSockets
-from backend.foundation.people.credentials import csrf_of, same_text
 from backend.foundation.people.errors import Forbidden, NotLoggedIn, TooOften
 from backend.foundation.people.identity import Actor, Identity, acting, arrived_s
 from backend.foundation.people.lease import Leases
+from backend.foundation.people.login.credentials import csrf_of, same_text
 from backend.foundation.people.rights import Right
 from backend.foundation.people.station import People
 from drivers.errors import DriveError, NotAllowed

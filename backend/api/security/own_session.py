@@ -13,9 +13,9 @@ from backend.api.security.gate import (
     credentials,
 )
 from backend.foundation.people.accounts import Accounts
-from backend.foundation.people.credentials import csrf_of
 from backend.foundation.people.errors import Forbidden
 from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.credentials import csrf_of
 from backend.foundation.people.login.devices import LIFETIME_S
 from backend.foundation.people.records import Account
 from backend.foundation.people.rights import Right

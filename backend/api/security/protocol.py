@@ -21,7 +21,7 @@ from websockets.frames import Frame
 from backend.api.admission.accepting import AcceptingSocket
 from backend.api.admission.requests import Beginnings
 from backend.api.security.rights import API
-from backend.foundation.people.throttle import Bucket
+from backend.foundation.people.login.throttle import Bucket
 
 #: Time limit [s] for the head of a request, from the connection or its first byte on.
 HEAD_S = 10.0

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from starlette.types import Message, Receive, Send
 
 from backend.foundation.people.errors import TooOften
-from backend.foundation.people.throttle import Bucket
+from backend.foundation.people.login.throttle import Bucket
 
 #: Our close codes: the session has ended; the page sends more than a person can cause.
 OVER, FLOODED = 4401, 4429

@@ -25,9 +25,9 @@ from backend.api.station.models_description import (
     ReadDictionaryRequest,
 )
 from backend.foundation.work.jobs import JobResult, Progress
-from backend.station.description import BadDescription, drive_task, import_in_process
+from backend.station.drives.description import BadDescription, drive_task, import_in_process
+from backend.station.drives.second_port import missing_ports
 from backend.station.line_search import search_line
-from backend.station.second_port import missing_ports
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts import limits

@@ -25,7 +25,7 @@ from backend.api.station.models_ethercat import (
 from backend.axes.drive.identity import confirm_identity
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.adapters import require_ethercat_adapter
 from drivers.cia402 import State
 from drivers.computer import permissions

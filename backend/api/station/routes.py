@@ -41,8 +41,8 @@ from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.records.audit import Fact
 from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
-from backend.station.second_port import require_same_drive
+from backend.station.drives.connected_drive import ConnectedDrive
+from backend.station.drives.second_port import require_same_drive
 from drivers.errors import NotAllowed
 from drivers.link import Found
 from drivers.texts.message import Text, text

@@ -38,7 +38,7 @@ from backend.axes.drive.drive import Drive
 from backend.records.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.autotune import candidates as tune_candidates
 from backend.tools.autotune import gains
 from backend.tools.autotune.axis_facts import read_facts

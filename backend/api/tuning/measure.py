@@ -30,7 +30,7 @@ from backend.foundation.work.jobs import JobResult, Progress
 from backend.records.library.measurements import MeasurementStore
 from backend.report.changes import Change
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.station.recording.service import Recordings
 from backend.tools.autotune.result import AutotuneAnswer

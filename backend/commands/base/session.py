@@ -19,7 +19,7 @@ from backend.commands.base.printing import note
 from backend.commands.base.restoring import recall
 from backend.foundation.work.jobs import Progress
 from backend.foundation.work.sleep_watch import SleepWatch
-from backend.station.matching import match_profiles, profile_for
+from backend.station.drives.matching import match_profiles, profile_for
 from drivers.computer import signals
 from drivers.errors import DriveError, NotAllowed
 from drivers.link import Found, Link

@@ -14,7 +14,7 @@ from backend.commands.base.printing import note, print_text, words_of
 from backend.commands.base.session import opened, run, show_progress
 from backend.station.doctor import Examined, examined
 from backend.station.doctor import tried as tried_once
-from backend.station.matching import match_profiles
+from backend.station.drives.matching import match_profiles
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.trials import trials
 from drivers.errors import NotAllowed

@@ -7,7 +7,7 @@ import json
 from backend.commands.base.options import Json, Server, Url, server_for
 from backend.commands.base.printing import print_text, words_of
 from backend.commands.base.session import opened, run, show_progress
-from backend.station.matching import match_profiles
+from backend.station.drives.matching import match_profiles
 from drivers.link import Found
 from drivers.texts.message import language
 from drivers.urls import bus_kind, parse_url

@@ -19,7 +19,7 @@ from backend.commands.server.keep import station_records
 from backend.foundation.store.files import write_atomically
 from backend.records.audit import Fact
 from backend.records.audit.facts import Value
-from backend.station.description import profile_of_drive
+from backend.station.drives.description import profile_of_drive
 from drivers.errors import NotAllowed
 from drivers.texts.checks import check_line
 from drivers.texts.imports import failure_text, finding_line, summary_text

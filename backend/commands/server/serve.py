@@ -33,10 +33,10 @@ from backend.foundation.store.database import FILE
 from backend.foundation.work import libraries
 from backend.foundation.work.journal import Entry
 from backend.station.bench import Bench
-from backend.station.box.announced import announced
-from backend.station.box.kept import Box, names_of, read
-from backend.station.box.roles import addresses_of
-from backend.station.box.shown import phone_address, scan_code
+from backend.station.install.box.announced import announced
+from backend.station.install.box.kept import Box, names_of, read
+from backend.station.install.box.roles import addresses_of
+from backend.station.install.box.shown import phone_address, scan_code
 from drivers.computer import scheduling
 from drivers.computer.processes import raise_descriptors
 from drivers.computer.sockets import take_port_alone
@@ -61,7 +61,7 @@ _LOOK_S = 3.0
 
 
 #: Modules that are imported only after the start, so that the page is available sooner.
-LATE = (*libraries.COMPUTING, "backend.report.pdf")
+LATE = (*libraries.COMPUTING, "backend.report.render.pdf")
 
 
 @dataclass(frozen=True, slots=True)

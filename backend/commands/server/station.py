@@ -15,10 +15,10 @@ from backend.commands.base.remote import remote
 from backend.commands.base.session import run
 from backend.commands.base.state import state_folder
 from backend.foundation.store.files import write_atomically
-from backend.station.box.kept import Box, keep, read
-from backend.station.box.roles import addresses_of, checked
-from backend.station.service import systemd_unit
-from backend.station.windows_task import windows_task
+from backend.station.install.box.kept import Box, keep, read
+from backend.station.install.box.roles import addresses_of, checked
+from backend.station.install.service import systemd_unit
+from backend.station.install.windows_task import windows_task
 from drivers.computer.interfaces import network_interfaces
 
 app = typer.Typer(help="A station as a service.", no_args_is_help=True)

@@ -14,19 +14,19 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 from backend.foundation.people import changes
-from backend.foundation.people.credentials import (
+from backend.foundation.people.directory import Directory
+from backend.foundation.people.errors import Forbidden, NotLoggedIn
+from backend.foundation.people.login.budgets import LoginBudgets, address_group
+from backend.foundation.people.login.credentials import (
     checked_person,
     digest,
     new_secret,
     same_code,
     spoken_code,
 )
-from backend.foundation.people.directory import Directory
-from backend.foundation.people.errors import Forbidden, NotLoggedIn
-from backend.foundation.people.login.budgets import LoginBudgets, address_group
 from backend.foundation.people.login.devices import KnownDevices
+from backend.foundation.people.login.passwords import Passwords, require_good
 from backend.foundation.people.login.turns import HashTurns
-from backend.foundation.people.passwords import Passwords, require_good
 from backend.foundation.people.records import Account, LoginSession, Token, read
 from backend.foundation.people.rights import ACCOUNT_ROLES, RIGHTS, Right, Role, rights_text
 from backend.foundation.store.database import Store

@@ -10,7 +10,7 @@ from datetime import datetime
 
 from sqlalchemy import delete, update
 
-from backend.foundation.people.credentials import name_key
+from backend.foundation.people.login.credentials import name_key
 from backend.foundation.people.records import Account, LoginSession, Token
 from backend.foundation.people.rights import Role
 from backend.foundation.people.tables import AccountRow, SessionRow, TokenRow

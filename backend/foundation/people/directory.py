@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from datetime import datetime, timedelta
 
-from backend.foundation.people.credentials import digest, name_key
 from backend.foundation.people.errors import NoSuchPerson
 from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.credentials import digest, name_key
 from backend.foundation.people.records import REMEMBERED, Account, LoginSession, Records, Token
 from backend.foundation.people.rights import MOVING, RIGHTS, Role
 from drivers.errors import NotAllowed

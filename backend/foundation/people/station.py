@@ -15,7 +15,7 @@ from backend.foundation.people.errors import NotLoggedIn
 from backend.foundation.people.identity import LOCAL, Identity
 from backend.foundation.people.login.devices import KnownDevices
 from backend.foundation.people.login.marker import AccountsMarker
-from backend.foundation.people.passwords import Passwords
+from backend.foundation.people.login.passwords import Passwords
 from backend.foundation.people.records import Account, LoginSession
 from backend.foundation.people.rights import RIGHTS
 from backend.foundation.people.support import Support

@@ -14,16 +14,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from backend.foundation.people.credentials import (
+from backend.foundation.people.elapsed import elapsed_s
+from backend.foundation.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
+from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.credentials import (
     checked_person,
     digest,
     new_secret,
     same_code,
     spoken_code,
 )
-from backend.foundation.people.elapsed import elapsed_s
-from backend.foundation.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
-from backend.foundation.people.identity import Identity
+from backend.foundation.people.login.throttle import Throttle
 from backend.foundation.people.rights import (
     GRANTABLE,
     MOVING,
@@ -33,7 +34,6 @@ from backend.foundation.people.rights import (
     right_text,
     rights_text,
 )
-from backend.foundation.people.throttle import Throttle
 from drivers.errors import NotAllowed
 from drivers.texts import limits
 from drivers.texts.message import Text, text

@@ -16,7 +16,7 @@ from backend.report.document import (
     Signatures,
     Table,
 )
-from backend.report.plot import Area, Drawing, Label, Line, Path, Point, Shape, draw
+from backend.report.render.plot import Area, Drawing, Label, Line, Path, Point, Shape, draw
 from backend.report.texts import Words
 
 _STYLE = """

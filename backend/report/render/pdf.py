@@ -44,7 +44,7 @@ from backend.report.document import (
     Signatures,
     Table,
 )
-from backend.report.plot import Area, Drawing, Label, Line, Path, Shape, draw
+from backend.report.render.plot import Area, Drawing, Label, Line, Path, Shape, draw
 from backend.report.texts import Words
 
 _PLAIN, _BOLD, _WIDE = "DejaVuSans", "DejaVuSans-Bold", "DroidSansFallbackFull"

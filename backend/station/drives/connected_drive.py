@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
-from backend.station.monitor import Monitor
+from backend.station.drives.monitor import Monitor
 
 
 class ConnectedDrive:

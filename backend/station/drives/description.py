@@ -67,7 +67,7 @@ async def import_in_process(
 async def _imported_apart(task: Work, limit_s: float, limit_mib: int) -> dict[str, Any]:
     try:
         given = await answer_of(
-            "backend.station.import_process", str(limit_mib), task=task, limit_s=limit_s
+            "backend.station.drives.import_process", str(limit_mib), task=task, limit_s=limit_s
         )
     except TimeoutError:
         raise BadDescription("station.import-ended-after", limit_s=limit_s) from None

@@ -1,4 +1,4 @@
-"""Process of an import: ``python -m backend.station.import_process MIB``, its memory limit [MiB].
+"""Process of an import: ``import_process MIB`` as a module, with its memory limit [MiB].
 
 The memory needed for a file is not known beforehand: its elements may take forty times their size
 in the file.

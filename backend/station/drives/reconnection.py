@@ -12,7 +12,7 @@ from backend.axes.restore.keep import keep_list
 from backend.axes.restore.store import RestoreStore
 from backend.foundation.store.files import StorageFailed
 from backend.foundation.work.jobs import Job, JobResult, Progress
-from backend.station.monitor import Snapshot
+from backend.station.drives.monitor import Snapshot
 from backend.tools.measuring.restore import settle
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed
@@ -21,7 +21,7 @@ from drivers.texts.message import text
 
 if TYPE_CHECKING:
     from backend.station.bench import Bench
-    from backend.station.connected_drive import ConnectedDrive
+    from backend.station.drives.connected_drive import ConnectedDrive
 
 _STANDS_S, _STANDS_RPM = 0.5, 5.0
 

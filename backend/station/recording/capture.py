@@ -23,7 +23,7 @@ from backend.records.recording.bundle import build_apart
 from backend.records.recording.evidence import Evidence, Value
 from backend.records.recording.flight import flights
 from backend.station.bench import Bench
-from backend.station.monitor import Snapshot
+from backend.station.drives.monitor import Snapshot
 from backend.station.recording import facts
 from backend.station.recording.streams import describe_streams
 from drivers.errors import DriveError, NotAllowed, why_of

@@ -13,7 +13,7 @@ from backend.axes.drive.drive import Drive
 from backend.axes.drive.readings import Reading
 from backend.axes.parameters import set_file as parameter_set
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import DriveError
 from drivers.link import LinkQuality
 from drivers.texts.answers import sentence

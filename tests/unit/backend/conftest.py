@@ -10,7 +10,7 @@ from backend.api.app import make_app
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.link import Found
 from profiles.motion.classify import classified
 from profiles.motion.rule import MotionRule

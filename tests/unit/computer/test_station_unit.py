@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from backend.station.service import systemd_unit
+from backend.station.install.service import systemd_unit
 from drivers.computer import permissions
 
 #: linux/capability.h

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.station.windows_task import windows_task
+from backend.station.install.windows_task import windows_task
 
 NAMES = {"task": "http://schemas.microsoft.com/windows/2004/02/mit/task"}
 PROGRAM = r"C:\Users\Jürgen Müller & Söhne\servodeck\python\python.exe"

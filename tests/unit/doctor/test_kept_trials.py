@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.doctor.diagnosis import Cause
 from drivers.doctor.examined import Examination
 from drivers.errors import Busy, DriveError, LinkTimeout, NotAllowed

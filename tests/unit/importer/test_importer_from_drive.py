@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from importer_samples import GOOD_EDS
 
-from backend.station.description import dictionary_entries, profile_of_drive
+from backend.station.drives.description import dictionary_entries, profile_of_drive
 from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found

@@ -12,7 +12,7 @@ from importer_samples import GOOD_EDS, GOOD_ESI
 
 from backend.axes.parameters.set_file import BadSet
 from backend.records.handover.esi import controller_of, reported_controllers
-from backend.station.description import BadDescription, Work, import_in_process
+from backend.station.drives.description import BadDescription, Work, import_in_process
 from drivers.errors import NotAllowed
 from profiles.importer.esi_controller import ControllersTask
 from profiles.importer.process import DevicesTask, FileTask

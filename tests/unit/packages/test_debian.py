@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.station.service import systemd_unit
+from backend.station.install.service import systemd_unit
 
 ROOT = Path(__file__).resolve().parents[3]
 _SPEC = importlib.util.spec_from_file_location("debian", ROOT / ".ci/supply/debian.py")

@@ -21,7 +21,7 @@ from backend.api.health.kept import records_of
 from backend.api.health.unattended import Unattended
 from backend.foundation.people.station import People
 from backend.station.bench import Bench
-from backend.station.monitor import Snapshot
+from backend.station.drives.monitor import Snapshot
 from backend.tools.health import run as health_run
 from backend.tools.health.result import HealthRound, HealthValue
 from backend.tools.health.settings import HealthSettings

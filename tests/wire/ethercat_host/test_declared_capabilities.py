@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.station.service import systemd_unit
+from backend.station.install.service import systemd_unit
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, child_environment, unavailable
 from tests.support.contained import NUMBERS

@@ -13,9 +13,9 @@ from __future__ import annotations
 import hashlib
 import ipaddress
 
-from backend.foundation.people.credentials import name_key
 from backend.foundation.people.errors import TooOften
-from backend.foundation.people.throttle import Throttle
+from backend.foundation.people.login.credentials import name_key
+from backend.foundation.people.login.throttle import Throttle
 
 #: Wrong tries before waits begin: of a name from one address, or from a known browser.
 FREE = 5

@@ -6,7 +6,7 @@ import contextlib
 import socket
 from collections.abc import AsyncIterator, Callable, Sequence
 
-from backend.station.box.kept import Box
+from backend.station.install.box.kept import Box
 
 _SERVICE = "_https._tcp.local."
 

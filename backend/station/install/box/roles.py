@@ -9,7 +9,7 @@ from pathlib import Path
 
 import psutil
 
-from backend.station.box.kept import Box, read
+from backend.station.install.box.kept import Box, read
 from drivers.computer.interfaces import Interface
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text

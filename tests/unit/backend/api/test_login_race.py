@@ -12,7 +12,7 @@ from argon2 import PasswordHasher
 
 from backend.foundation.people.accounts import Accounts
 from backend.foundation.people.errors import NotLoggedIn
-from backend.foundation.people.passwords import Passwords
+from backend.foundation.people.login.passwords import Passwords
 from backend.foundation.people.rights import Role
 from backend.foundation.store.database import Store
 

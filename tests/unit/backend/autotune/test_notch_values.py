@@ -18,7 +18,7 @@ from backend.api.tuning.models import NotchPreviewRequest
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.notch.filters import encode, off_raw, response
 from backend.tools.notch.meaning import NotchMeaning
 from drivers.errors import OutOfRange

@@ -15,7 +15,7 @@ from backend.axes.scales.scale import ScaleUnknown
 from backend.axes.scales.taught import Taught
 from backend.foundation.store.files import StorageFailed
 from backend.station.bench import Bench
-from backend.station.drive_list import DriveList, SavedDrive, SavedPort
+from backend.station.drives.drive_list import DriveList, SavedDrive, SavedPort
 from drivers.errors import LinkLost
 from drivers.link import Found
 from tests.support.memory_link import MemoryLink

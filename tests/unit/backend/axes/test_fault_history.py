@@ -10,7 +10,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.fault_history import named_fault, read_history
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.recording.facts import past_faults
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address

@@ -14,8 +14,8 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.readings import Reading
 from backend.foundation.work.journal import Journal
-from backend.station import monitor as watching
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives import monitor as watching
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import State
 from drivers.texts.message import text
 from tests.support.servo import STATUS, Servo

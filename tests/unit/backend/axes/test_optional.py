@@ -11,7 +11,7 @@ import pytest
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog

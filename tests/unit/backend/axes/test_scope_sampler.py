@@ -8,7 +8,7 @@ import time
 import pytest
 
 from backend.axes.scope.hub import ScopeHub
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 
 KEY = "6064:00"
 

@@ -9,7 +9,7 @@ import pytest
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.axes.parameters.set_file import storable
-from backend.station.second_port import missing_ports, require_same_drive
+from backend.station.drives.second_port import missing_ports, require_same_drive
 from drivers.codec import encode
 from drivers.errors import NotAllowed
 from profiles import load_profile

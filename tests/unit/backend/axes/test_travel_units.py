@@ -26,7 +26,7 @@ from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.axes.scales.gear_calculator import Mechanics
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import _require_inside
 from backend.tools.moves import move as moving

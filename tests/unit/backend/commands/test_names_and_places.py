@@ -11,7 +11,7 @@ from backend.commands.base.state import state_folder
 from backend.foundation.store.files import StorageFailed, checked_name, new_name, write_atomically
 from backend.records.library.folder import SetLibrary
 from backend.records.recording.library import RecordingLibrary
-from backend.station.drive_list import DriveList
+from backend.station.drives.drive_list import DriveList
 from drivers.computer import files as computer_files
 from drivers.computer.files import longest_path
 from drivers.errors import NotAllowed

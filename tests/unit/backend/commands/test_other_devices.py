@@ -11,7 +11,7 @@ from backend import cli
 from backend.commands.base import session
 from backend.commands.buses.doctor import _fitting
 from backend.commands.drive.scales import _farther
-from backend.station.matching import match_profiles
+from backend.station.drives.matching import match_profiles
 from drivers.link import Found
 from tests.support.memory_link import MemoryLink
 

@@ -19,9 +19,9 @@ from backend.foundation.people.identity import LOCAL, Actor, acting
 from backend.foundation.people.station import People
 from backend.foundation.work.jobs import JobRunner, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
+from backend.station.drives.monitor import Snapshot
 from backend.station.measuring import Exchange
-from backend.station.monitor import Snapshot
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.link import CyclicSignal

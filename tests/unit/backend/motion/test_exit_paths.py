@@ -27,7 +27,7 @@ from backend.foundation.people.station import People
 from backend.foundation.people.support import Support
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange, exchange_for
 from backend.tools.jog.cyclic import jog_cyclic
 from backend.tools.jog.release import END_OF_JOG

@@ -19,7 +19,7 @@ from backend.axes.motion.grant import Grant, NotGranted
 from backend.axes.motion.stopping import stops
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, NotAllowed
 from drivers.texts.message import Text, text

@@ -15,7 +15,7 @@ from backend.axes.drive.ports import Port
 from backend.foundation.people.identity import LOCAL, Actor, acting
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.jog import run as jogging
 from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
 from backend.tools.jog.release import END_OF_JOG

@@ -16,7 +16,7 @@ from backend.axes.axis.restoring import RestoreFailed
 from backend.axes.drive.identity import read_serial
 from backend.foundation.store.files import StorageFailed
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.measuring.temporary import temporary
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost

@@ -7,7 +7,7 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.axes.axis.stop.quick_stop import STOP_S
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.measuring.recording import Play, bus_limits, enabled, play
 from backend.tools.measuring.temporary import stopping_hard
 from drivers.cia402 import Mode

@@ -18,7 +18,7 @@ from backend.axes.restore.process import lives, this_process
 from backend.axes.restore.store import RestoreStore
 from backend.commands.base import restoring
 from backend.commands.base.state import STATE_FOLDER_VARIABLE, state_folder
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import Busy, NotAllowed
 from tests.support.servo import Servo
 

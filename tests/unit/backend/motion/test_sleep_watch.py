@@ -11,7 +11,7 @@ from backend.foundation.work import sleep_watch
 from backend.foundation.work.jobs import Progress
 from backend.foundation.work.sleep_watch import LONGEST_S, PERIOD_S, SleepWatch
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 from tests.support.servo import Servo

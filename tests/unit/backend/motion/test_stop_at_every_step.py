@@ -17,7 +17,7 @@ import pytest
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.moves.move import MoveSettings, move

@@ -16,7 +16,7 @@ from backend.axes.axis.stop.facts import StepCode
 from backend.axes.motion.grant import NotGranted
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.cia402 import Mode
 from drivers.errors import Rejected
 from drivers.texts.message import text

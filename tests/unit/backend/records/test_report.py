@@ -24,10 +24,10 @@ from backend.report.compose import compose
 from backend.report.document import Document, Language, Note, Table
 from backend.report.facts import ChangedSetting, Facts, Identity, Measured
 from backend.report.gather import choose, measured_from, shown
-from backend.report.html import render_html
-from backend.report.pdf import render_pdf
-from backend.report.plot import Area, Curve, Label, Line, Plot, draw
-from backend.report.plot import Path as Stroke
+from backend.report.render.html import render_html
+from backend.report.render.pdf import render_pdf
+from backend.report.render.plot import Area, Curve, Label, Line, Plot, draw
+from backend.report.render.plot import Path as Stroke
 from backend.report.store import ReportStore
 from backend.report.texts import TEXTS
 from backend.tools.sweep.result import SweepAnswer

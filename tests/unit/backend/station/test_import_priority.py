@@ -15,7 +15,7 @@ from tests.support.station import until
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has classes of priority, no steps")
 @pytest.mark.parametrize(
     "module",
-    [["backend.station.import_process", "768"], ["backend.records.response_import.process"]],
+    [["backend.station.drives.import_process", "768"], ["backend.records.response_import.process"]],
 )
 def test_an_import_goes_after_the_server(module: list[str]) -> None:
     own = os.getpriority(os.PRIO_PROCESS, 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.station import matching
+from backend.station.drives import matching
 from drivers.link import Found
 from profiles.schema import Profile
 

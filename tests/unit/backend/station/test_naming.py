@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from backend.station.demo import DemoBench
-from backend.station.naming import PlaceNames, new_id
+from backend.station.drives.naming import PlaceNames, new_id
 
 
 def test_a_drive_of_the_demo_is_called_as_its_bench_calls_it(tmp_path: Path) -> None:

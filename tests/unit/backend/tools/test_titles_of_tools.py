@@ -11,7 +11,7 @@ import httpx
 import pytest
 
 from backend.station.bench import Bench
-from backend.station.connected_drive import ConnectedDrive
+from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange
 from backend.tools.registry import TOOLS
 from backend.tools.tool import AnyTool
