@@ -6,9 +6,9 @@ import { createRoot } from 'react-dom/client'
 import { whenUnknown } from './api/client'
 import { App } from './app/App'
 import { keepFocus } from './app/focus'
-import { keepPresses } from './app/press'
-import { checkSession } from './app/session'
-import { listenForAnswers, listenForEscape } from './app/stop'
+import { keepPresses } from './app/stop/press'
+import { checkSession } from './app/people/session'
+import { listenForAnswers, listenForEscape } from './app/stop/stop'
 import * as live from './live/live'
 
 listenForEscape()

@@ -2,7 +2,7 @@ import { ActionIcon, Menu, useMantineColorScheme } from '@mantine/core'
 import { useT } from '../i18n'
 import { Icon } from '../widgets/Icon'
 import { useLink } from '../live/store'
-import { leave, useSession } from './session'
+import { leave, useSession } from './people/session'
 import { setPlace, useHasTour } from './tour/tour'
 
 /** Appearance, the time zone of what is shown, and who is logged in. */

@@ -1,5 +1,5 @@
 import { type ComponentType, lazy, type LazyExoticComponent } from 'react'
-import { arrived } from './arrived'
+import { arrived } from './notes/arrived'
 import type { AxisPage, BenchPage } from './router'
 
 type Shown<Props> = LazyExoticComponent<ComponentType<Props>> & { fetch: () => Promise<unknown> }

@@ -2,7 +2,7 @@ import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import { figure } from '../widgets/format'
+import { figure } from '../widgets/numbers/format'
 import { axisLook } from './axis'
 
 export interface PlottedCurve {

@@ -1,5 +1,5 @@
 import { useRef } from 'react'
-import { figure } from '../widgets/format'
+import { figure } from '../widgets/numbers/format'
 import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
 import { ticks } from './ticks'

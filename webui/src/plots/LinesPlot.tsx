@@ -1,7 +1,7 @@
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import { figure } from '../widgets/format'
+import { figure } from '../widgets/numbers/format'
 import { axisLook } from './axis'
 import { lineWidth } from './line-width'
 import { sharedCursor } from './shared-cursor'

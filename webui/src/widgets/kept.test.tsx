@@ -2,7 +2,7 @@
 import '../testing/page'
 import { act, renderHook } from '@testing-library/react'
 import { expect, it, vi } from 'vitest'
-import { currentSession, keep as keepSession, mayHaveStop } from '../app/session'
+import { currentSession, keep as keepSession, mayHaveStop } from '../app/people/session'
 import { storedPlace, storePlace } from '../app/tour/steps'
 import type { Session } from '../api/schema'
 import { setLanguage } from '../i18n'

@@ -1,10 +1,10 @@
 import { useRef } from 'react'
-import type { AxisState } from '../api/schema'
-import { useSay, useT } from '../i18n'
-import { useAxisState } from '../live/store'
-import { Icon } from '../widgets/Icon'
-import { href, type Page } from './router'
-import { listsFaults } from './states'
+import type { AxisState } from '../../api/schema'
+import { useSay, useT } from '../../i18n'
+import { useAxisState } from '../../live/store'
+import { Icon } from '../../widgets/Icon'
+import { href, type Page } from '../router'
+import { listsFaults } from '../states'
 
 /** What went wrong with an axis while its page is open: no answer, a fault. */
 export function AxisNotes({ drive, page }: { drive: string; page: Page }) {

@@ -1,7 +1,7 @@
 import { useMemo, useSyncExternalStore } from 'react'
-import { useT } from '../i18n'
-import { contents, subscribe, useDrives } from '../live/store'
-import { stopEverything } from './stop'
+import { useT } from '../../i18n'
+import { contents, subscribe, useDrives } from '../../live/store'
+import { stopEverything } from '../stop/stop'
 
 /** Axes that turn although nobody may move them: on every page, for as long as they turn. */
 export function TurningNote() {

@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from 'vitest'
-import { setLink } from '../live/store'
+import { setLink } from '../../live/store'
 import { arrived } from './arrived'
 
 const link = (open: boolean) => setLink({ open, attempt: 0, roundTripMs: null }, 0)

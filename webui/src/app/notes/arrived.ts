@@ -1,4 +1,4 @@
-import { contents, subscribe } from '../live/store'
+import { contents, subscribe } from '../../live/store'
 
 /** A fetch may fail before the page has word that the connection is gone. */
 const AGAIN_MS = 1000

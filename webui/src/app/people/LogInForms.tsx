@@ -1,11 +1,11 @@
 import { Button, PasswordInput, TextInput } from '@mantine/core'
 import { type ReactNode, useState } from 'react'
-import { api, ask } from '../api/client'
-import type { Session } from '../api/schema'
-import { useT } from '../i18n'
-import { Panel } from '../widgets/Panel'
-import { ProblemNote } from '../widgets/ProblemNote'
-import { useAction } from '../widgets/useAction'
+import { api, ask } from '../../api/client'
+import type { Session } from '../../api/schema'
+import { useT } from '../../i18n'
+import { Panel } from '../../widgets/Panel'
+import { ProblemNote } from '../../widgets/ProblemNote'
+import { useAction } from '../../widgets/useAction'
 import { keep } from './session'
 
 /** The address of an invitation. */

@@ -1,9 +1,9 @@
 import { type ReactNode, useEffect } from 'react'
-import { useT } from '../i18n'
-import * as live from '../live/live'
+import { useT } from '../../i18n'
+import * as live from '../../live/live'
 import { GUEST, Join, LogIn, SetUp } from './LogInForms'
-import { Preferences } from './Preferences'
-import { StopButton } from './StopButton'
+import { Preferences } from '../Preferences'
+import { StopButton } from '../stop/StopButton'
 import { askSession, mayHaveStop, useSession } from './session'
 
 const RETRY_MS = 2000

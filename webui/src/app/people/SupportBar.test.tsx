@@ -1,10 +1,10 @@
 // @vitest-environment happy-dom
-import { posted, settled, shown } from '../testing/page'
+import { posted, settled, shown } from '../../testing/page'
 import { fireEvent, screen } from '@testing-library/react'
 import { beforeEach, expect, it } from 'vitest'
-import type { InvitationView } from '../api/schema'
-import { people } from '../live/people'
-import { publish } from '../live/store'
+import type { InvitationView } from '../../api/schema'
+import { people } from '../../live/people'
+import { publish } from '../../live/store'
 import { SupportBar } from './SupportBar'
 
 const INVITATION = {

@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react'
-import * as live from '../live/live'
-import { usePeople, usePointers } from '../live/people'
+import * as live from '../../live/live'
+import { usePeople, usePointers } from '../../live/people'
 
 const SEND_MS = 80
 

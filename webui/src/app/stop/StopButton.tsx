@@ -1,9 +1,9 @@
 import { useEffect } from 'react'
 import { createPortal } from 'react-dom'
-import type { AxisStopInfo } from '../api/schema'
-import { useSay, useT } from '../i18n'
-import { useDrives, useStore } from '../live/store'
-import { Icon } from '../widgets/Icon'
+import type { AxisStopInfo } from '../../api/schema'
+import { useSay, useT } from '../../i18n'
+import { useDrives, useStore } from '../../live/store'
+import { Icon } from '../../widgets/Icon'
 import { currentReport, dismissReport, stopEverything } from './stop'
 
 const GOOD_NEWS_MS = 6000

@@ -1,7 +1,7 @@
 import { useEffect, useState } from 'react'
 import { createPortal } from 'react-dom'
-import { useT } from '../i18n'
-import { contents, subscribe } from '../live/store'
+import { useT } from '../../i18n'
+import { contents, subscribe } from '../../live/store'
 import { pressedAt } from './stop'
 
 /** How long after one's own STOP the server's log reports that one. */

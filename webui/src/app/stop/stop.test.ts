@@ -1,8 +1,8 @@
 // @vitest-environment happy-dom
-import { posted, serve } from '../testing/page'
+import { posted, serve } from '../../testing/page'
 import { afterEach, beforeEach, expect, it, vi } from 'vitest'
-import type { StopResult } from '../api/schema'
-import { contents, publish, setLink } from '../live/store'
+import type { StopResult } from '../../api/schema'
+import { contents, publish, setLink } from '../../live/store'
 import { currentReport, dismissReport, listenForAnswers, stopEverything } from './stop'
 
 const RESULT = { stopped: ['x'], failed: {}, axes: [] } as unknown as StopResult

@@ -1,7 +1,7 @@
-import { API_ROOT } from '../api/client'
-import type { StopResult } from '../api/schema'
-import * as live from '../live/live'
-import { contents, publish, subscribe } from '../live/store'
+import { API_ROOT } from '../../api/client'
+import type { StopResult } from '../../api/schema'
+import * as live from '../../live/live'
+import { contents, publish, subscribe } from '../../live/store'
 
 /** What the last STOP reached. `null` answer: the server has not answered yet. */
 export interface StopReport {

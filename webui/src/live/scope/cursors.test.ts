@@ -1,5 +1,11 @@
 import { describe, expect, it } from 'vitest'
-import type { CursorMoved, InvitationView, PeopleHere, PersonHere, PlotCursor } from '../api/schema'
+import type {
+  CursorMoved,
+  InvitationView,
+  PeopleHere,
+  PersonHere,
+  PlotCursor,
+} from '../../api/schema'
 import { cursorsOn, heldInside, isShared, Pointing } from './cursors'
 
 function here(state: InvitationView['state'], pages: Record<string, string>): PeopleHere {

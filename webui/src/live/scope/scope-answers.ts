@@ -4,7 +4,7 @@ import { columns, thinned } from './decimate'
 import type { stretch } from './measure'
 import type { Trace } from './ring'
 import type { Sweep } from './trigger'
-import type { Overlay, Questions } from './worker-messages'
+import type { Overlay, Questions } from '../worker-messages'
 
 /** These sweeps, oldest first, in times from their trigger. */
 export function overlays(sweeps: Sweep[], traces: Trace[], bins: number): Overlay[] {

@@ -1,4 +1,4 @@
-import type { ScopeStart } from '../api/schema'
+import type { ScopeStart } from '../../api/schema'
 import { decodeBlocks, type ScopeBlock } from './blocks'
 import { columns } from './decimate'
 import { MathsChannel } from './maths'
@@ -16,7 +16,7 @@ import type {
   ScopeTrigger,
   ScopeView,
   TriggerState,
-} from './worker-messages'
+} from '../worker-messages'
 
 /** Rows kept per channel: at 4 kHz 80 s, and 16 channels of it take 82 MB. */
 const GREATEST_ROWS = 320_000

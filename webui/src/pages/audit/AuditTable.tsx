@@ -1,7 +1,7 @@
 import type { AuditEvent } from '../../api/schema'
 import { known, useSay, useT } from '../../i18n'
 import type { Say } from '../../i18n'
-import { dateTime } from '../../widgets/format'
+import { dateTime } from '../../widgets/numbers/format'
 
 /** Entries as rows; on a narrow screen each becomes a card. */
 export function AuditTable({ events }: { events: AuditEvent[] }) {

@@ -4,7 +4,7 @@ import { api, ask } from '../../api/client'
 import type { LineSearchResult } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setJob, useJob } from '../../live/store'
-import { JobNote } from '../../widgets/JobNote'
+import { JobNote } from '../../widgets/jobs/JobNote'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 

@@ -1,6 +1,6 @@
 import { known, useT } from '../../i18n'
 import { Panel } from '../../widgets/Panel'
-import { ParameterFields } from '../../widgets/ParameterFields'
+import { ParameterFields } from '../../widgets/parameters/ParameterFields'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
 import { useFunctions } from '../../widgets/useFunctions'

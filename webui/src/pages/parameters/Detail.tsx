@@ -4,10 +4,16 @@ import { api, ask } from '../../api/client'
 import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setReadings, useReading } from '../../live/store'
-import { dateTime, hexadecimal, isInteger, toValue } from '../../widgets/format'
+import { dateTime, hexadecimal, isInteger, toValue } from '../../widgets/numbers/format'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { type BitField, bitFields, getField, parseTyped, setField } from '../../widgets/parse'
+import {
+  type BitField,
+  bitFields,
+  getField,
+  parseTyped,
+  setField,
+} from '../../widgets/numbers/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { Said } from '../../widgets/Said'

@@ -1,6 +1,6 @@
 import type { DiffRow, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ValueTable } from '../../widgets/ValueTable'
+import { ValueTable } from '../../widgets/parameters/ValueTable'
 
 const canTick = (row: DiffRow) => row.status === 'differs' && row.file_raw !== null
 

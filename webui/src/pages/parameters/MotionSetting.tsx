@@ -5,10 +5,10 @@ import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setReadings, useAxisState, useReading } from '../../live/store'
 import { ProblemNote } from '../../widgets/ProblemNote'
-import { parseTyped } from '../../widgets/parse'
-import { StartButton } from '../../widgets/StartButton'
+import { parseTyped } from '../../widgets/numbers/parse'
+import { StartButton } from '../../widgets/jobs/StartButton'
 import { useAction } from '../../widgets/useAction'
-import { useObstacle } from '../../widgets/useObstacle'
+import { useObstacle } from '../../widgets/jobs/useObstacle'
 import { editText, range } from './GridRow'
 
 /** States of CiA 402 in which the motor has no power, as the server asks for them. */

@@ -1,7 +1,7 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
 import type { ParameterRow } from '../../api/schema'
-import { hasRight, useSession } from '../../app/session'
+import { hasRight, useSession } from '../../app/people/session'
 import { useSay, useT } from '../../i18n'
 import { MotionSetting } from './MotionSetting'
 

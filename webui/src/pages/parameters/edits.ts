@@ -1,8 +1,8 @@
 import { api, ask, problemOf } from '../../api/client'
 import type { Problem, WriteResult } from '../../api/schema'
 import { contents, publish, setReadings, useStore } from '../../live/store'
-import { toValue } from '../../widgets/format'
-import { parseTyped } from '../../widgets/parse'
+import { toValue } from '../../widgets/numbers/format'
+import { parseTyped } from '../../widgets/numbers/parse'
 import type { ParameterInfo } from '../../widgets/types'
 
 /** A typed value that is not in the drive. It survives leaving the page, not closing it. */

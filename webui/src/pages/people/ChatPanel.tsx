@@ -5,7 +5,7 @@ import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import { addChat, useChat } from '../../live/people'
 import { useLink } from '../../live/store'
-import { clock } from '../../widgets/format'
+import { clock } from '../../widgets/numbers/format'
 import { Panel } from '../../widgets/Panel'
 
 /** Lines for everybody on the station. */

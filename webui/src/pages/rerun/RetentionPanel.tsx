@@ -3,10 +3,10 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { RecordingList } from '../../api/schema'
 import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/NumberField'
+import { NumberField } from '../../widgets/numbers/NumberField'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
-import { useWrong } from '../../widgets/useWrong'
+import { useWrong } from '../../widgets/numbers/useWrong'
 import { size } from './viewer'
 
 const GIGA = 1e9

@@ -4,8 +4,8 @@ import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
 import { offerDownload } from '../files/sets'
-import { type Curve, toCsv } from './bode'
-import { bodeSvg, toPng } from './picture'
+import { type Curve, toCsv } from './plot/bode'
+import { bodeSvg, toPng } from './plot/picture'
 import type { Sweep } from './results'
 
 const FORMATS = ['csv', 'json', 'svg', 'png'] as const

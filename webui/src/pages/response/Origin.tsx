@@ -1,6 +1,6 @@
 import type { MeasurementContent } from '../../api/schema'
 import { useT } from '../../i18n'
-import { dateTime } from '../../widgets/format'
+import { dateTime } from '../../widgets/numbers/format'
 
 /** Settings as `name: value` with the envelope's own fields among them. */
 export function flat(settings: Record<string, unknown>): [string, string][] {

@@ -1,7 +1,7 @@
 import { useT } from '../../i18n'
-import type { Measurement } from '../../live/measure'
+import type { Measurement } from '../../live/scope/measure'
 import type { ScopeFrame } from '../../live/worker-messages'
-import { figure } from '../../widgets/format'
+import { figure } from '../../widgets/numbers/format'
 import type { Shown } from './setup'
 
 /** Older than this counts as “nothing comes”. */

@@ -3,7 +3,7 @@ import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
 import type { ScopeFrame } from '../../live/worker-messages'
-import { NumberField } from '../../widgets/NumberField'
+import { NumberField } from '../../widgets/numbers/NumberField'
 import { needsBit, needsDrive, needsHigh, needsLevel, type Shown } from './setup'
 
 const MODES = ['off', 'auto', 'normal', 'single'] as const

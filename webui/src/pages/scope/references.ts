@@ -1,5 +1,5 @@
 import { useCallback, useState } from 'react'
-import { thinned } from '../../live/decimate'
+import { thinned } from '../../live/scope/decimate'
 import type { Overlay } from '../../live/worker-messages'
 import type { PlotOverlay } from '../../plots/TimePlot'
 import type { Shown } from './setup'

@@ -1,6 +1,6 @@
 import { SegmentedControl } from '@mantine/core'
 import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/NumberField'
+import { NumberField } from '../../widgets/numbers/NumberField'
 import type { Form } from './mechanics'
 
 /** The dimensions that the chosen kind of mechanics has. `resolution` only where a gear is planned. */

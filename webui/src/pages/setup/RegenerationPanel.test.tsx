@@ -6,7 +6,7 @@ import { expect, it, vi } from 'vitest'
 import type { BrakingInfo } from '../../api/schema'
 import { RegenerationPanel } from './RegenerationPanel'
 
-vi.mock('../response/useGains', () => ({ useGains: () => ({ gains: null }) }))
+vi.mock('../response/design/useGains', () => ({ useGains: () => ({ gains: null }) }))
 
 const RESULT = { verdict: 'capacitor' } as BrakingInfo
 const VERDICT = 'The capacitors of the DC bus absorb all of it. No resistor is needed.'

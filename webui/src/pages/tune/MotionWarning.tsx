@@ -1,5 +1,5 @@
 import { useT } from '../../i18n'
-import type { Limits } from '../response/limits'
+import type { Limits } from '../response/plot/limits'
 
 /** What will move, within the limits that were permitted: next to every button that starts it. */
 export function MotionWarning({

@@ -5,7 +5,7 @@ import * as live from '../../live/live'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { CyclicExchange } from '../connect/CyclicExchange'
-import { LimitFields, type useLimits } from '../response/limits'
+import { LimitFields, type useLimits } from '../response/plot/limits'
 import type { Check } from './steps'
 
 /** What is needed before anything moves, as text, with the way to it. */

@@ -1,10 +1,10 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useMemo } from 'react'
 import { type Key, useT } from '../../i18n'
-import { fixed } from '../response/bode'
-import { Legend } from '../response/Legend'
+import { fixed } from '../response/plot/bode'
+import { Legend } from '../response/plot/Legend'
 import type { Step } from '../response/results'
-import { StepPlot, type Trace } from '../response/StepPlot'
+import { StepPlot, type Trace } from '../response/plot/StepPlot'
 import { TRACE_COLORS } from '../scope/channels'
 import { engineering } from './steps'
 

@@ -2,7 +2,7 @@ import { Button, NativeSelect } from '@mantine/core'
 import { useState } from 'react'
 import type { AxisState, InertiaRequest } from '../../api/schema'
 import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/NumberField'
+import { NumberField } from '../../widgets/numbers/NumberField'
 
 const SCHEMES = ['free', 'limited', 'taught'] as const
 type Scheme = InertiaRequest['scheme']

@@ -1,8 +1,8 @@
-import type { ActiveFault } from '../api/schema'
-import { useT } from '../i18n'
-import { Icon } from './Icon'
-import { ParameterText } from './ParameterText'
-import { OriginalSwitch, ProfileText } from './profile-text/ProfileText'
+import type { ActiveFault } from '../../api/schema'
+import { useT } from '../../i18n'
+import { Icon } from '../Icon'
+import { ParameterText } from '../parameters/ParameterText'
+import { OriginalSwitch, ProfileText } from '../profile-text/ProfileText'
 
 /** Faults and warnings with cause and remedy from the manual. */
 export function FaultList({ drive, faults }: { drive: string; faults: ActiveFault[] }) {

@@ -1,10 +1,10 @@
 // @vitest-environment happy-dom
-import { shown } from '../testing/page'
+import { shown } from '../../testing/page'
 import { screen } from '@testing-library/react'
 import { expect, it, vi } from 'vitest'
-import type { JobInfo } from '../api/schema'
-import { forgetServerClock, heardServerTime } from '../live/server-clock'
-import { setJob } from '../live/store'
+import type { JobInfo } from '../../api/schema'
+import { forgetServerClock, heardServerTime } from '../../live/server-clock'
+import { setJob } from '../../live/store'
 import { JobNote } from './JobNote'
 
 it('counts by the clock of the server, whose times a job has', async () => {

@@ -1,13 +1,13 @@
 import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../api/client'
-import type { JobInfo } from '../api/schema'
-import { type Say, type T, useSay, useT } from '../i18n'
-import { serverNow } from '../live/server-clock'
-import { setJob, useJob } from '../live/store'
-import { clock, duration } from './format'
-import { ProblemNote } from './ProblemNote'
-import { useAction } from './useAction'
+import { api, ask } from '../../api/client'
+import type { JobInfo } from '../../api/schema'
+import { type Say, type T, useSay, useT } from '../../i18n'
+import { serverNow } from '../../live/server-clock'
+import { setJob, useJob } from '../../live/store'
+import { clock, duration } from '../numbers/format'
+import { ProblemNote } from '../ProblemNote'
+import { useAction } from '../useAction'
 
 /** How long the good end of a job is reported. */
 const DONE_MS = 6000

@@ -1,6 +1,6 @@
 import { Button } from '@mantine/core'
 import { type ReactNode, useEffect, useState } from 'react'
-import { useT } from '../i18n'
+import { useT } from '../../i18n'
 
 const SHOWN_MS = 12000
 

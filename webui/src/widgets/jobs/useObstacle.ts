@@ -1,6 +1,6 @@
-import type { AxisState } from '../api/schema'
-import { type Say, type T, useSay, useT } from '../i18n'
-import { useAxisState, useJob, useLink } from '../live/store'
+import type { AxisState } from '../../api/schema'
+import { type Say, type T, useSay, useT } from '../../i18n'
+import { useAxisState, useJob, useLink } from '../../live/store'
 
 /** What keeps every motion of an axis from being started now, as text; null: nothing. */
 export function useObstacle(drive: string): string | null {

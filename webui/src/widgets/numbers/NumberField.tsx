@@ -1,6 +1,6 @@
 import { TextInput } from '@mantine/core'
 import { useEffect, useRef, useState } from 'react'
-import { useT } from '../i18n'
+import { useT } from '../../i18n'
 import { faultOf, toNumber } from './number-text'
 
 /** A number with its unit. Says at once what is wrong; `null` while it is not a valid number. */

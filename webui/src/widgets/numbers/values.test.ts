@@ -1,10 +1,10 @@
 import { describe, expect, it } from 'vitest'
-import type { ParameterRow } from '../api/schema'
-import { parseStations } from '../pages/connect/stations'
-import { groups, isChanged, matches, select } from '../pages/parameters/filters'
+import type { ParameterRow } from '../../api/schema'
+import { parseStations } from '../../pages/connect/stations'
+import { groups, isChanged, matches, select } from '../../pages/parameters/filters'
 import { clock, dateTime, duration, figure, hexadecimal, quantity, shown, toValue } from './format'
 import { bitFields, getField, parseTyped, setField } from './parse'
-import { translatedRows } from './profile-text/shown-row'
+import { translatedRows } from '../profile-text/shown-row'
 
 function row(part: Partial<ParameterRow>): ParameterRow {
   const reading = {

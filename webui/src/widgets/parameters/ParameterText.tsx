@@ -1,8 +1,8 @@
-import type { ParameterRow } from '../api/schema'
-import { href } from '../app/router'
+import type { ParameterRow } from '../../api/schema'
+import { href } from '../../app/router'
 import { namedParameters } from './named-parameters'
-import { ProfileText } from './profile-text/ProfileText'
-import { useRows } from './profile-text/rows'
+import { ProfileText } from '../profile-text/ProfileText'
+import { useRows } from '../profile-text/rows'
 
 const NONE: ParameterRow[] = []
 

@@ -1,11 +1,11 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../api/client'
-import { useT } from '../i18n'
-import { setJob, useDrive } from '../live/store'
-import { JobNote } from './JobNote'
-import { ProblemNote } from './ProblemNote'
-import { useAction } from './useAction'
+import { api, ask } from '../../api/client'
+import { useT } from '../../i18n'
+import { setJob, useDrive } from '../../live/store'
+import { JobNote } from '../jobs/JobNote'
+import { ProblemNote } from '../ProblemNote'
+import { useAction } from '../useAction'
 
 /** What a motion changed and could not restore, with one press to do so once the drive answers. */
 export function PendingRestoresNote({ drive }: { drive: string }) {

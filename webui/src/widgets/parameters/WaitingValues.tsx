@@ -1,8 +1,8 @@
-import type { ParameterValue } from '../api/schema'
-import { useT } from '../i18n'
-import { useReadings } from '../live/store'
-import { shown } from './format'
-import { useRows } from './profile-text/rows'
+import type { ParameterValue } from '../../api/schema'
+import { useT } from '../../i18n'
+import { useReadings } from '../../live/store'
+import { shown } from '../numbers/format'
+import { useRows } from '../profile-text/rows'
 
 /** Procedures after which values act or are kept, and the values that wait for that. */
 const WAITING: Record<string, (now: ParameterValue) => boolean> = {

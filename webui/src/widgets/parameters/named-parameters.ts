@@ -1,4 +1,4 @@
-import type { ParameterRow } from '../api/schema'
+import type { ParameterRow } from '../../api/schema'
 
 type Named = Pick<ParameterRow, 'key' | 'name' | 'number'>
 

@@ -4,7 +4,7 @@ import { api, ask } from '../../../api/client'
 import type { DoctorTrial, StationDiagnosis, TrialResult } from '../../../api/schema'
 import { useSay, useT } from '../../../i18n'
 import { setJob } from '../../../live/store'
-import { JobNote, useJobEnd } from '../../../widgets/JobNote'
+import { JobNote, useJobEnd } from '../../../widgets/jobs/JobNote'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
 

@@ -1,6 +1,6 @@
-import type { GainValues } from '../../api/schema'
-import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/NumberField'
+import type { GainValues } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 
 export type PartialGains = { [name in keyof GainValues]: number | null }
 

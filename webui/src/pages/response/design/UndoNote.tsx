@@ -1,10 +1,10 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
-import { useT } from '../../i18n'
-import { dateTime } from '../../widgets/format'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { api, ask } from '../../../api/client'
+import { useT } from '../../../i18n'
+import { dateTime } from '../../../widgets/numbers/format'
+import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useAction } from '../../../widgets/useAction'
 import { changedSince, forget, noteUndone, useChanges } from './undo'
 
 /** The newest change to an axis, with the way back. */

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import { loopView, unwrapped } from './loops'
-import type { Sweep } from './results'
+import type { Sweep } from '../results'
 
 /** The closed loop of an integrator of crossover 50 Hz with 1 ms of delay. */
 function sweepOf(frequency: number[]): { sweep: Sweep; open: { db: number; deg: number }[] } {

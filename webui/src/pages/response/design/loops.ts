@@ -1,5 +1,5 @@
-import type { Curve } from './bode'
-import type { Sweep } from './results'
+import type { Curve } from '../plot/bode'
+import type { Sweep } from '../results'
 
 /** What is shown of a closed loop T: itself, L = T/(1−T), or S = 1−T. */
 export const LOOP_VIEWS = ['closed', 'open', 'sensitivity'] as const

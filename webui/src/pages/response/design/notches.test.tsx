@@ -1,10 +1,10 @@
 // @vitest-environment happy-dom
-import { asked, sent, serve, settled, shown, type } from '../../testing/page'
+import { asked, sent, serve, settled, shown, type } from '../../../testing/page'
 import { screen, waitFor } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it } from 'vitest'
-import type { NotchSlotInfo } from '../../api/schema'
-import { setLink } from '../../live/store'
+import type { NotchSlotInfo } from '../../../api/schema'
+import { setLink } from '../../../live/store'
 import { NotchEditor } from './NotchEditor'
 import { merged, type Notches, useNotches } from './useNotches'
 

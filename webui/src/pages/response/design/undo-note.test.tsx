@@ -1,11 +1,11 @@
 // @vitest-environment happy-dom
-import { asked, later, refusal, serve, settled, shown, type } from '../../testing/page'
+import { asked, later, refusal, serve, settled, shown, type } from '../../../testing/page'
 import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it, vi } from 'vitest'
-import type { ParameterRow, ParameterValue } from '../../api/schema'
-import { setReadings, setRows } from '../../live/store'
-import { ParameterFields } from '../../widgets/ParameterFields'
+import type { ParameterRow, ParameterValue } from '../../../api/schema'
+import { setReadings, setRows } from '../../../live/store'
+import { ParameterFields } from '../../../widgets/parameters/ParameterFields'
 import { remember, useChanges } from './undo'
 import { UndoNote } from './UndoNote'
 

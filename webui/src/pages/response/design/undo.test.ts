@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import type { Problem } from '../../api/schema'
+import type { Problem } from '../../../api/schema'
 import { changedSince } from './undo'
 
 const refused: Problem = {

@@ -1,6 +1,6 @@
 import { useSyncExternalStore } from 'react'
-import type { Problem } from '../../api/schema'
-import { publish } from '../../live/store'
+import type { Problem } from '../../../api/schema'
+import { publish } from '../../../live/store'
 
 /** What a write answers: raw values that undo it, and those that it left. */
 export interface Written {

@@ -1,9 +1,9 @@
 import { useRef, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { NotchPreviewInfo, NotchSlotInfo } from '../../api/schema'
-import { useAnswer } from '../../widgets/useAnswer'
-import { useFetched } from '../../widgets/useFunctions'
-import type { NotchShape } from './results'
+import { api, ask } from '../../../api/client'
+import type { NotchPreviewInfo, NotchSlotInfo } from '../../../api/schema'
+import { useAnswer } from '../../../widgets/useAnswer'
+import { useFetched } from '../../../widgets/useFunctions'
+import type { NotchShape } from '../results'
 
 const SETTLE_MS = 250
 const MOST_LINES = 5000

@@ -1,7 +1,7 @@
-import { api, ask } from '../../api/client'
-import type { GainValues, PredictionInfo } from '../../api/schema'
-import { useAnswer } from '../../widgets/useAnswer'
-import type { NotchShape } from './results'
+import { api, ask } from '../../../api/client'
+import type { GainValues, PredictionInfo } from '../../../api/schema'
+import { useAnswer } from '../../../widgets/useAnswer'
+import type { NotchShape } from '../results'
 
 const SETTLE_MS = 300
 

@@ -1,16 +1,16 @@
 import { Button, FileButton, NativeSelect, useComputedColorScheme } from '@mantine/core'
 import { useMemo, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { RecordingPreview } from '../../api/schema'
-import { useT } from '../../i18n'
-import { figure } from '../../widgets/format'
-import { Icon } from '../../widgets/Icon'
-import { NumberField } from '../../widgets/NumberField'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
-import { useWrong, type Wrong } from '../../widgets/useWrong'
-import { TRACE_COLORS } from '../scope/channels'
+import { api, ask } from '../../../api/client'
+import type { RecordingPreview } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { figure } from '../../../widgets/numbers/format'
+import { Icon } from '../../../widgets/Icon'
+import { NumberField } from '../../../widgets/numbers/NumberField'
+import { Panel } from '../../../widgets/Panel'
+import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useAction } from '../../../widgets/useAction'
+import { useWrong, type Wrong } from '../../../widgets/numbers/useWrong'
+import { TRACE_COLORS } from '../../scope/channels'
 import {
   guessed,
   INPUT_UNITS,
@@ -20,7 +20,7 @@ import {
   STRUCTURES,
   TIME_UNITS,
 } from './imports'
-import { StepPlot } from './StepPlot'
+import { StepPlot } from '../plot/StepPlot'
 
 const NO_TIME = ''
 const asFile = {

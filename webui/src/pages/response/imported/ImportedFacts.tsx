@@ -1,8 +1,8 @@
-import { useT } from '../../i18n'
-import { figure } from '../../widgets/format'
-import { fixed, hertz } from './bode'
+import { useT } from '../../../i18n'
+import { figure } from '../../../widgets/numbers/format'
+import { fixed, hertz } from '../plot/bode'
 import { axisOf, importedOf } from './imports'
-import type { ImportedAxis, Sweep } from './results'
+import type { ImportedAxis, Sweep } from '../results'
 
 /** How an import was evaluated, and what was concluded of the axis where its structure is stated. */
 export function ImportedFacts({ sweep }: { sweep: Sweep }) {

@@ -1,5 +1,5 @@
-import type { ImportedAxis, ImportedFacts, Sweep } from './results'
-import type { paths, RecordingPreview } from '../../api/schema'
+import type { ImportedAxis, ImportedFacts, Sweep } from '../results'
+import type { paths, RecordingPreview } from '../../../api/schema'
 
 type Query = paths['/api/v1/measurements/import']['post']['parameters']['query']
 

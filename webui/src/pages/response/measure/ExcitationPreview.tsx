@@ -1,13 +1,13 @@
 import { useMemo } from 'react'
-import { api, ask } from '../../api/client'
-import type { ExcitationInfo, SweepRequest } from '../../api/schema'
-import { useT } from '../../i18n'
-import { figure } from '../../widgets/format'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAnswer } from '../../widgets/useAnswer'
-import { TRACE_COLORS } from '../scope/channels'
-import { fixed, hertz } from './bode'
-import { StepPlot } from './StepPlot'
+import { api, ask } from '../../../api/client'
+import type { ExcitationInfo, SweepRequest } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { figure } from '../../../widgets/numbers/format'
+import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useAnswer } from '../../../widgets/useAnswer'
+import { TRACE_COLORS } from '../../scope/channels'
+import { fixed, hertz } from '../plot/bode'
+import { StepPlot } from '../plot/StepPlot'
 
 const SETTLE_MS = 400
 

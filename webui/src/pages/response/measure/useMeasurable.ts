@@ -1,5 +1,5 @@
-import type { AxisState, DriveSummary } from '../../api/schema'
-import { useBuses } from '../../live/buses'
+import type { AxisState, DriveSummary } from '../../../api/schema'
+import { useBuses } from '../../../live/buses'
 import { type Measurable, measurable } from './measurable'
 
 /** How an axis can be given a setpoint with every cycle of its bus, as it is connected now. */

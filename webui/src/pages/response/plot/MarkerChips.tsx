@@ -1,5 +1,5 @@
 import type { KeyboardEvent } from 'react'
-import { useT } from '../../i18n'
+import { useT } from '../../../i18n'
 import { hertz } from './bode'
 import type { Marker } from './BodePlot'
 

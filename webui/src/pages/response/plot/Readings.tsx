@@ -1,7 +1,7 @@
 import { Button } from '@mantine/core'
-import { type Key, useT } from '../../i18n'
+import { type Key, useT } from '../../../i18n'
 import { fixed, hertz, nearest, wrapWhole } from './bode'
-import type { Margins, Sweep } from './results'
+import type { Margins, Sweep } from '../results'
 
 /** The curve's values under both cursors, and their difference. */
 export function CursorTable({

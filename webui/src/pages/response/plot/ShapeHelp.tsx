@@ -1,6 +1,6 @@
-import { useT } from '../../i18n'
+import { useT } from '../../../i18n'
 import { fixed } from './bode'
-import type { Sweep } from './results'
+import type { Sweep } from '../results'
 import { judge, SHAPES } from './shapes'
 
 /** What the curve says about the machine, and what to look at before any filter is set. */

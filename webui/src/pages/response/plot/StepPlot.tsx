@@ -1,10 +1,10 @@
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import type { PlotName } from '../../live/cursors'
-import { axisLook } from '../../plots/axis'
-import { sharedCursor } from '../../plots/shared-cursor'
-import { figure } from '../../widgets/format'
+import type { PlotName } from '../../../live/scope/cursors'
+import { axisLook } from '../../../plots/axis'
+import { sharedCursor } from '../../../plots/shared-cursor'
+import { figure } from '../../../widgets/numbers/format'
 
 export interface Trace {
   label: string

@@ -16,7 +16,7 @@ import {
   wrapWhole,
 } from './bode'
 import { bodeSvg } from './picture'
-import { asAutotune, asSweep, filesOf, type Sweep } from './results'
+import { asAutotune, asSweep, filesOf, type Sweep } from '../results'
 
 const sweep: Sweep = {
   kind: 'mechanics',

@@ -1,4 +1,4 @@
-import type { NotchShape, Sweep } from './results'
+import type { NotchShape, Sweep } from '../results'
 
 /** One curve over frequency. Values that say nothing are null. */
 export interface Curve {

@@ -1,9 +1,9 @@
 import { Checkbox } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { useT } from '../../i18n'
-import { useAxisState, useDrive } from '../../live/store'
-import { NumberField } from '../../widgets/NumberField'
-import { useRemembered } from '../motion/remembered'
+import { useT } from '../../../i18n'
+import { useAxisState, useDrive } from '../../../live/store'
+import { NumberField } from '../../../widgets/numbers/NumberField'
+import { useRemembered } from '../../motion/remembered'
 
 /** The motion envelope of every measurement; `null` while a field is not filled in. */
 export interface Limits {

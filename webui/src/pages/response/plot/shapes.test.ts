@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import type { Resonance, Sweep } from './results'
+import type { Resonance, Sweep } from '../results'
 import { judge } from './shapes'
 
 const peak = (frequency_hz: number, damping = 0.02): Resonance => ({

@@ -1,4 +1,4 @@
-import type { Sweep } from './results'
+import type { Sweep } from '../results'
 
 /** What a measured response of the mechanics lets one say about the machine. */
 export interface Judgement {

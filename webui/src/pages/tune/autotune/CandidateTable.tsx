@@ -1,7 +1,7 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { known, useT } from '../../../i18n'
-import { fixed, hertz } from '../../response/bode'
+import { fixed, hertz } from '../../response/plot/bode'
 import type { Candidate } from '../../response/results'
 
 /** The marked designs, or all of them, fastest first; `onApply` writes one of them. */

@@ -1,5 +1,5 @@
 import { useT } from '../../../i18n'
-import { fixed, hertz } from '../../response/bode'
+import { fixed, hertz } from '../../response/plot/bode'
 import type { BandVerdict, Interval, Verdict } from '../../response/results'
 
 /** Margins of the tuned loop by band: where it was measured, and where it is predicted. */

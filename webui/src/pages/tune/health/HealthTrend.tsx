@@ -3,7 +3,7 @@ import { useMemo, useState } from 'react'
 import type { HealthRunInfo } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
-import { dateTime, figure } from '../../../widgets/format'
+import { dateTime, figure } from '../../../widgets/numbers/format'
 import { useCurveColors } from '../tools/Answer'
 import { type Series, seriesOf } from './health'
 

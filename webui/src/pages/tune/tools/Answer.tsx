@@ -1,6 +1,6 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useT } from '../../../i18n'
-import type { ShownNote, ShownRow, ShownTable } from './shown'
+import type { ShownNote, ShownRow, ShownTable } from './model/shown'
 import { amount, interval } from '../steps'
 
 const COLORS = {

@@ -3,7 +3,7 @@ import { resultOf } from '../../../api/results'
 import type { BrakeResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { Notes, useCurveColors, ValuesTable } from './Answer'
-import type { ShownNote, ShownRow, Text } from './shown'
+import type { ShownNote, ShownRow, Text } from './model/shown'
 import { engineering } from '../steps'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 

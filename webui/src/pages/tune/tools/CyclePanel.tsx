@@ -6,8 +6,8 @@ import type { CycleResult } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { Notes, useCurveColors, ValuesTable } from './Answer'
-import { cycleNotes, cycleRows } from './cycle'
-import type { Text } from './shown'
+import { cycleNotes, cycleRows } from './model/cycle'
+import type { Text } from './model/shown'
 import { ToolPanel, ToolStart, useToolRun } from './ToolPanel'
 
 /** The load of the machine's own cycle. Nothing moves, so nothing is agreed to before. */

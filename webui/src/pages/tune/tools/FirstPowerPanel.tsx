@@ -3,7 +3,7 @@ import { resultOf } from '../../../api/results'
 import type { FirstPowerResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { useCurveColors } from './Answer'
-import type { Text } from './shown'
+import type { Text } from './model/shown'
 import { amount } from '../steps'
 import { type Measured, ToolPanel, ToolStart, useToolRun } from './ToolPanel'
 

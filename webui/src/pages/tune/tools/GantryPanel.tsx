@@ -13,8 +13,8 @@ import {
   gantryNotes,
   gantryRows,
   motionCurves,
-} from './gantry'
-import type { Text } from './shown'
+} from './model/gantry'
+import type { Text } from './model/shown'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
 /** Two axes of one machine, measured together. */

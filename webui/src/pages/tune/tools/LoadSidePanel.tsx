@@ -3,8 +3,8 @@ import { resultOf } from '../../../api/results'
 import type { LoadSideResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { Notes, useCurveColors, ValuesTable } from './Answer'
-import { loadSideNotes, loadSideRows } from './loadSide'
-import type { Text } from './shown'
+import { loadSideNotes, loadSideRows } from './model/loadSide'
+import type { Text } from './model/shown'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
 /** Backlash, stiffness and transmission error, where the drive reports a second position. */

@@ -8,8 +8,8 @@ import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
 import { Notes, useCurveColors, ValuesTable } from './Answer'
-import { notesOf, rowsOf } from './safety'
-import type { Text } from './shown'
+import { notesOf, rowsOf } from './model/safety'
+import type { Text } from './model/shown'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
 const FUNCTIONS = ['sto', 'ss1', 'limit_positive', 'limit_negative', 'speed_limit'] as const

@@ -5,8 +5,8 @@ import type { ShapingResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { useSay } from '../../../widgets/profile-text/texts'
 import { ListTables, Notes, useCurveColors, ValuesTable } from './Answer'
-import { shapingNotes, shapingRows, shapingTables } from './shaping'
-import type { Text } from './shown'
+import { shapingNotes, shapingRows, shapingTables } from './model/shaping'
+import type { Text } from './model/shown'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
 
 const SHAPERS = ['auto', 'zv', 'zvd', 'ei'] as const

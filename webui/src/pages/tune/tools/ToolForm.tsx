@@ -3,12 +3,12 @@ import { useEffect, useState } from 'react'
 import { api, ask } from '../../../api/client'
 import type { ToolInfo } from '../../../api/schema'
 import { useLanguage } from '../../../i18n'
-import { NumberField } from '../../../widgets/NumberField'
-import type { Wrong } from '../../../widgets/useWrong'
-import type { Limits } from '../../response/limits'
+import { NumberField } from '../../../widgets/numbers/NumberField'
+import type { Wrong } from '../../../widgets/numbers/useWrong'
+import type { Limits } from '../../response/plot/limits'
 import { MotionWarning } from '../MotionWarning'
-import { warnsOfMotion } from './toolMotion'
-import { unitOf } from './toolUnit'
+import { warnsOfMotion } from './model/toolMotion'
+import { unitOf } from './model/toolUnit'
 
 /** What the form of the limits asks for already. */
 const LIMITS = new Set([

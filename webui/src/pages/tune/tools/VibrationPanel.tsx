@@ -4,9 +4,15 @@ import { resultOf } from '../../../api/results'
 import type { DwellResult, VibrationResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { ListTables, Notes, useCurveColors, ValuesTable } from './Answer'
-import type { Text } from './shown'
+import type { Text } from './model/shown'
 import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
-import { dwellRows, levelCurves, vibrationNotes, vibrationRows, vibrationTables } from './vibration'
+import {
+  dwellRows,
+  levelCurves,
+  vibrationNotes,
+  vibrationRows,
+  vibrationTables,
+} from './model/vibration'
 
 /** Orders, frequencies and resonances over the speed. */
 export function VibrationPanel(measured: Measured) {

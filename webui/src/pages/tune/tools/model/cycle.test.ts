@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest'
-import type { CycleResult } from '../../../api/schema'
+import type { CycleResult } from '../../../../api/schema'
 import { cycleNotes, cycleRows } from './cycle'
 
 const RESULT = {

@@ -1,6 +1,6 @@
-import type { CycleResult } from '../../../api/schema'
+import type { CycleResult } from '../../../../api/schema'
 import type { ShownNote, ShownRow, Text } from './shown'
-import { engineering } from '../steps'
+import { engineering } from '../../steps'
 
 /** What somebody should do something about. */
 const WARNS: ReadonlySet<string> = new Set([

@@ -1,4 +1,4 @@
-import type { FrictionResult } from '../../../api/schema'
+import type { FrictionResult } from '../../../../api/schema'
 
 type Ripple = Pick<
   FrictionResult,

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import type { AxisState, DriveSummary, GantryResult } from '../../../api/schema'
+import type { AxisState, DriveSummary, GantryResult } from '../../../../api/schema'
 import { candidatesOf, couplingCurve, gantryNotes, gantryRows, motionCurves } from './gantry'
 
 const SEGMENT = 'ethercat://eth0'

@@ -1,6 +1,6 @@
-import type { AxisState, DriveSummary, GantryResult, GantryValue } from '../../../api/schema'
+import type { AxisState, DriveSummary, GantryResult, GantryValue } from '../../../../api/schema'
 import type { ShownNote, ShownRow, Text } from './shown'
-import { type Check, engineering, preChecks } from '../steps'
+import { type Check, engineering, preChecks } from '../../steps'
 
 interface ShownCurve {
   label: string

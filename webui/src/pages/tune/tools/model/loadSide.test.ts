@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import type { LoadSideResult } from '../../../api/schema'
+import type { LoadSideResult } from '../../../../api/schema'
 import { loadSideNotes, loadSideRows } from './loadSide'
 
 const RESULT = {

@@ -1,6 +1,6 @@
-import type { LoadSideResult } from '../../../api/schema'
+import type { LoadSideResult } from '../../../../api/schema'
 import type { Ends, ShownNote, ShownRow, Text } from './shown'
-import { engineering } from '../steps'
+import { engineering } from '../../steps'
 
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
   measured: 'good',

@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import type { SafetyResult } from '../../../api/schema'
+import type { SafetyResult } from '../../../../api/schema'
 import { notesOf, rowsOf } from './safety'
 
 const text = (name: string, values?: Record<string, string>) =>

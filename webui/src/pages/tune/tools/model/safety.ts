@@ -1,6 +1,6 @@
-import type { SafetyResult } from '../../../api/schema'
+import type { SafetyResult } from '../../../../api/schema'
 import type { ShownNote, ShownRow, Text } from './shown'
-import { engineering } from '../steps'
+import { engineering } from '../../steps'
 
 /** The verdict first, as `backend/tools/safety_check/texts.py` has it; always that it is no certificate. */
 export function notesOf(result: SafetyResult, text: Text): ShownNote[] {

@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest'
-import type { ShapingResult } from '../../../api/schema'
+import type { ShapingResult } from '../../../../api/schema'
 import { shapingNotes, shapingRows, shapingTables } from './shaping'
 
 const RESULT = {

@@ -1,6 +1,6 @@
-import type { ShapingResult } from '../../../api/schema'
+import type { ShapingResult } from '../../../../api/schema'
 import type { ShownNote, ShownRow, ShownTable, Text } from './shown'
-import { engineering } from '../steps'
+import { engineering } from '../../steps'
 
 const TONES = {
   verified: 'good',

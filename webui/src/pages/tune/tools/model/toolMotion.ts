@@ -1,4 +1,4 @@
-import type { ToolInfo } from '../../../api/schema'
+import type { ToolInfo } from '../../../../api/schema'
 
 /**
  * Whether the form of a tool warns of its motion. A tool with a greater danger states that in its

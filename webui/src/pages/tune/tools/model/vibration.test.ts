@@ -1,5 +1,5 @@
 import { expect, test } from 'vitest'
-import type { DwellResult, VibrationResult } from '../../../api/schema'
+import type { DwellResult, VibrationResult } from '../../../../api/schema'
 import { dwellRows, levelCurves, vibrationNotes, vibrationRows, vibrationTables } from './vibration'
 
 const MAP = {

@@ -1,6 +1,6 @@
-import type { DwellResult, VibrationResult } from '../../../api/schema'
+import type { DwellResult, VibrationResult } from '../../../../api/schema'
 import type { Ends, ShownNote, ShownRow, ShownTable, Text } from './shown'
-import { engineering } from '../steps'
+import { engineering } from '../../steps'
 
 /** As `backend/tools/vibration/texts.py` and `backend/tools/dwell/texts.py` have them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
