@@ -77,9 +77,9 @@ _PROBLEMS = (
     (409, "Not possible now"),
     (413, "Too large"),
     (422, "Not acceptable"),
-    (429, "Too often"),
-    (502, "The answer makes no sense"),
-    (503, "The link is gone"),
+    (429, "Too many requests"),
+    (502, "Invalid answer"),
+    (503, "Link lost"),
     (504, "No answer in time"),
 )
 _PARTS = (

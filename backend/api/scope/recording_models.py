@@ -196,4 +196,4 @@ class ArmRequest(Message):
 class BundleRequest(Message):
     """Reason for making a support bundle."""
 
-    reason: str = Field(default="asked for", min_length=1, max_length=200)
+    reason: str = Field(default="", max_length=200, description="empty: made by hand")

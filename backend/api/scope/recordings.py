@@ -43,6 +43,7 @@ from backend.station.recording.recorder import Recorder, Settings, Trigger
 from backend.station.recording.service import Recordings
 from backend.station.recording.streams import describe_streams
 from drivers.errors import NotAllowed
+from drivers.texts.message import prose, text
 
 router = APIRouter()
 
@@ -412,7 +413,9 @@ async def arm_capture(capture: TheCapture, request: ArmRequest) -> ArmRequest:
 @router.post("/bundles", status_code=201)
 async def make_bundle(capture: TheCapture, request: BundleRequest) -> BundleInfo:
     """Make a support bundle of the last seconds now."""
-    name = await capture.bundle(request.reason)
+    given = request.reason.strip()
+    reason = prose(given) if given else text("bundle.by-hand")
+    name = await capture.bundle(reason)
     status = capture.path(name).stat()
     return BundleInfo(name=name, created=convert.moment(status.st_mtime), bytes=status.st_size)
 

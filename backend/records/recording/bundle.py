@@ -18,11 +18,12 @@ from typing import Any
 from backend.foundation.store.files import StorageFailed
 from backend.foundation.store.spreadsheet import as_text
 from backend.records.recording import chunks
-from backend.records.recording.bundle_page import drawings_of, log_line, page, when
+from backend.records.recording.bundle_page import LOGS, PAGES, drawings_of, log_line, page, when
 from backend.records.recording.evidence import Evidence, Value
 from backend.records.recording.export import NICE, to_csv
 from backend.records.recording.reader import RecordingReader
 from drivers.computer.processes import yield_processor
+from drivers.texts.answers import sentence
 from profiles.replacing import move_into_place
 
 
@@ -86,30 +87,32 @@ def _failed(target: Path, why: str) -> StorageFailed:
 
 
 def _fill(archive: zipfile.ZipFile, evidence: Evidence, folder: Path) -> None:
-    drawings = ""
+    drawings = dict.fromkeys(PAGES, "")
     if evidence.blocks:
         recording = folder / f"samples{chunks.SUFFIX}"
         recording.write_bytes(_recording(evidence))
         archive.write(recording, recording.name)
         with RecordingReader(recording) as reader:
             to_csv(reader, folder / "samples.csv", lambda _fraction: None)
-            drawings = drawings_of(reader, evidence)
+            drawings = {each: drawings_of(reader, evidence, each) for each in PAGES}
         archive.write(folder / "samples.csv", "samples.csv")
     for axis in evidence.axes:
         archive.writestr(f"parameters/{axis['drive']}.csv", _parameters(axis))
     for name, data in evidence.frames.items():
         archive.writestr(f"frames/{name}", data)
     facts = {
-        "reason": evidence.reason,
+        **sentence("reason", evidence.reason),
         "time": evidence.time,
         "servodeck": evidence.version,
         "axes": list(evidence.axes),
         "links": list(evidence.links),
     }
     archive.writestr("facts.json", json.dumps(facts, indent=1, ensure_ascii=False, default=str))
-    archive.writestr("log.txt", "".join(f"{line}\n" for line in map(log_line, evidence.log)))
     archive.writestr("history.csv", _history(evidence.history))
-    archive.writestr("index.html", page(evidence, drawings))
+    for language, name in PAGES.items():
+        log = "".join(f"{log_line(entry, language)}\n" for entry in evidence.log)
+        archive.writestr(LOGS[language], log)
+        archive.writestr(name, page(evidence, drawings[language], language))
 
 
 def _recording(evidence: Evidence) -> bytes:
@@ -118,7 +121,7 @@ def _recording(evidence: Evidence) -> bytes:
         "servodeck": evidence.version,
         "created": evidence.time,
         "clock": evidence.clock,
-        "notes": evidence.reason,
+        "notes": evidence.reason.words(),
         "axes": list(evidence.axes),
         "streams": list(evidence.streams),
     }

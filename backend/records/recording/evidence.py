@@ -8,6 +8,7 @@ from typing import Any
 
 from backend.foundation.work.journal import Entry
 from drivers.link import ScopeBlock
+from drivers.texts.message import Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,7 @@ class Value:
 class Evidence:
     """Contents of a bundle. ``axes``: identity, state, parameters and past faults of each."""
 
-    reason: str
+    reason: Text
     time: float
     version: str
     axes: Sequence[dict[str, Any]]
@@ -36,5 +37,5 @@ class Evidence:
     clock: dict[str, float]
     frames: Mapping[str, bytes] = field(default_factory=dict)
     """pcapng files of the opened buses, by their file names in the bundle."""
-    names: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    names: Mapping[tuple[str, str], Text] = field(default_factory=dict)
     """Names of the values of the history with their units, by drive and key."""

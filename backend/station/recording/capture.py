@@ -29,7 +29,7 @@ from backend.station.recording.streams import describe_streams
 from drivers.errors import DriveError, NotAllowed, why_of
 from drivers.link import ScopeBlock
 from drivers.texts import limits
-from drivers.texts.message import text
+from drivers.texts.message import Text, joined, profile_text, text
 
 SUFFIX = ".zip"
 #: Time stored before and after the fault [s].
@@ -74,7 +74,7 @@ class FaultCapture:
         self._block_bytes = 0
         self._values: deque[Value] = deque(maxlen=MAX_VALUES)
         self._faults: dict[str, frozenset[str]] = {}
-        self._pending: list[str] = []
+        self._pending: list[Text] = []
         self._reported: dict[tuple[str, str], float] = {}
         self._task: asyncio.Task[None] | None = None
         self._held: asyncio.Task[None] | None = None
@@ -160,16 +160,20 @@ class FaultCapture:
         new = [f for code, f in now.items() if before is not None and code not in before]
         if not new:
             return
-        text = ", ".join(f"{f.code} {f.name}" for f in new)
         connected = self._bench.connected_drives.get(drive)
-        self._on_fault(drive, text)
+        self._on_fault(drive, ", ".join(f"{f.code} {f.name}" for f in new))
         if connected is None or not self.armed:
             return
         at = time.monotonic()
         if all(at - self._reported.get((drive, f.code), -PAUSE_S) < PAUSE_S for f in new):
             return
         self._reported |= {(drive, f.code): at for f in new}
-        self._pending.append(f"{connected.drive.name}: {text}")
+        family = connected.drive.profile.drive
+        faults = joined(
+            (text("bundle.one-fault", code=f.code, name=profile_text(family, f.name)) for f in new),
+            ", ",
+        )
+        self._pending.append(text("bundle.fault-of", axis=connected.drive.name, faults=faults))
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._freeze(time.time()), name="fault-capture")
 
@@ -177,12 +181,12 @@ class FaultCapture:
         """Write a bundle `AFTER_S` after the fault; repeat where further faults came meanwhile."""
         while self._pending:
             await asyncio.sleep(AFTER_S)
-            reason = "; ".join(self._pending)
+            reason = joined(self._pending)
             self._pending.clear()
             await self._keep(reason, when)
             when = time.time()
 
-    async def _keep(self, reason: str, when: float) -> None:
+    async def _keep(self, reason: Text, when: float) -> None:
         evidence = await self._evidence(reason, when)
         try:
             name = await self._write(evidence)
@@ -218,7 +222,7 @@ class FaultCapture:
 
     # --- bundles ----------------------------------------------------------------------
 
-    async def bundle(self, reason: str, *, when: float | None = None) -> str:
+    async def bundle(self, reason: Text, *, when: float | None = None) -> str:
         """Make a support bundle now; return its file name.
 
         Raises:
@@ -236,13 +240,13 @@ class FaultCapture:
                 limit=limits.stays_free(RESERVE_BYTES),
                 free_mib=free >> 20,
             )
-        path = self._path_for(evidence.reason, evidence.time)
+        path = self._path_for(evidence.reason.words(), evidence.time)
         await build_apart(evidence, path)
         for old in self.names()[KEEP_BUNDLES:]:
             self.path(old).unlink(missing_ok=True)
         return path.name
 
-    async def _evidence(self, reason: str, when: float) -> Evidence:
+    async def _evidence(self, reason: Text, when: float) -> Evidence:
         # The ring buffers continue to run: copy them before the slow reading of parameters.
         self._forget_old()
         blocks, values = [(tap, b) for _, tap, b in self._blocks], list(self._values)
@@ -283,14 +287,19 @@ class FaultCapture:
             names=self._names(values),
         )
 
-    def _names(self, values: list[Value]) -> dict[tuple[str, str], str]:
+    def _names(self, values: list[Value]) -> dict[tuple[str, str], Text]:
         """Names and units of the values, for reading the bundle without the station."""
         names = {}
         for drive_id, key in {(v.drive, v.key) for v in values}:
             if (connected := self._bench.connected_drives.get(drive_id)) is not None:
                 parameter = connected.drive.parameter(key)
-                unit = f" [{parameter.unit}]" if parameter.unit else ""
-                names[drive_id, key] = f"{connected.drive.name} {parameter.name}{unit}"
+                family = connected.drive.profile.drive
+                axis, name = connected.drive.name, profile_text(family, parameter.name)
+                names[drive_id, key] = (
+                    text("bundle.quantity-unit", axis=axis, name=name, unit=parameter.unit)
+                    if parameter.unit
+                    else text("bundle.quantity", axis=axis, name=name)
+                )
         return names
 
     def _known(self, tap: _Tap) -> bool:

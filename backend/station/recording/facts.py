@@ -16,7 +16,9 @@ from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from drivers.errors import DriveError
 from drivers.link import LinkQuality
-from drivers.texts.answers import sentence
+from drivers.texts.answers import sentence, sentences
+from drivers.texts.message import text
+from drivers.texts.states import state_text
 
 #: Time limit [s], so that a drive without answer does not delay the samples of the others.
 GEARING_TIMEOUT_S = 2.0
@@ -68,9 +70,11 @@ def _row(connected: ConnectedDrive, reading: Reading | None, key: str) -> dict[s
     parameter = connected.drive.parameter(key)
     row: dict[str, Any] = {"key": key, "name": parameter.name, "unit": parameter.unit}
     if reading is None:
-        return row | {"raw": None, "value": None, "time": None, "error": "not read"}
+        row |= {"raw": None, "value": None, "time": None}
+        return row | sentence("error", text("bundle.not-read"))
     raw, value = _plain(reading.raw), _plain(reading.value)
-    return row | {"raw": raw, "value": value, "time": reading.time, "error": reading.error}
+    row |= {"raw": raw, "value": value, "time": reading.time}
+    return row | sentence("error", reading.problem)
 
 
 async def gearing(connected: ConnectedDrive) -> None:
@@ -90,16 +94,19 @@ async def past_faults(connected: ConnectedDrive, *, timeout_s: float) -> dict[st
     """
     drive, history = connected.drive, history_of(connected.drive)
     if history is None or history.kind == "unreadable":
-        return {"records": [], "why": "the drive has no record that can be read"}
+        return {"records": [], **sentence("why", text("bundle.no-record"))}
     if history.kind == "selected":
-        why = f"a record is chosen by writing {history.select_key}: read it on the Alarms page"
-        return {"records": [], "why": why}
+        why = text("bundle.record-by-write", key=history.select_key)
+        return {"records": [], **sentence("why", why)}
     try:
         async with asyncio.timeout(timeout_s):
             found = await read_history(connected.axis)
-    except (DriveError, TimeoutError) as error:
-        return {"records": [], "why": str(error) or f"no answer within {timeout_s:g} s"}
-    return {"records": [_past(drive, each) for each in found], "why": ""}
+    except DriveError as error:
+        return {"records": [], **sentence("why", error.text)}
+    except TimeoutError:
+        why = text("bundle.no-answer-in-time", timeout_s=timeout_s)
+        return {"records": [], **sentence("why", why)}
+    return {"records": [_past(drive, each) for each in found], **sentence("why", None)}
 
 
 def _past(drive: Drive, past: PastFault) -> dict[str, Any]:
@@ -129,7 +136,8 @@ def state(connected: ConnectedDrive) -> dict[str, Any]:
     """The monitor's last snapshot."""
     snapshot = connected.monitor.snapshot
     content = asdict(snapshot)
-    content["state"] = str(snapshot.state)
+    content |= sentence("state", state_text(snapshot.state))
+    content |= sentences("blocked_by", snapshot.blocked_by)
     content |= sentence("problem", snapshot.problem)
     content["faults"] = [
         {

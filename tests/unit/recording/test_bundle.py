@@ -19,7 +19,12 @@ from backend.records.recording.evidence import Evidence, Value
 from backend.records.recording.reader import RecordingReader
 from backend.station.recording import capture
 from backend.station.recording.recorder import Trigger, fires
-from drivers.texts.message import prose
+from drivers.cia402 import State
+from drivers.texts.answers import sentence
+from drivers.texts.message import profile_text, prose, text
+from drivers.texts.profile_words import ProfileWords
+from drivers.texts.states import state_text
+from profiles.loader import load_profile
 from tests.unit.recording.support import block, header
 
 
@@ -60,12 +65,24 @@ def test_a_peak_of_one_sample_is_drawn() -> None:
     assert 'x1="360.0"' in drawing, "10 s of 25 s is at 360 of 900"
 
 
+#: Named by the profile, and so in both languages.
+VOLTAGE = load_profile("mms7").parameter("6079:00").name
+OVER_VOLTAGE = next(f for f in load_profile("mms7").faults if f.code == "0x3210")
+
+
 def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
     head = header(2, 1)
     axis = {
         "drive": "x0",
         "name": "X0",
-        "state": {"state": "Fault", "faults": []},
+        "profile": "mms7",
+        "state": {
+            **sentence("state", state_text(State.FAULT)),
+            "fresh": True,
+            "faults": [{"kind": "fault", "code": OVER_VOLTAGE.code, "name": OVER_VOLTAGE.name,
+                        "causes": list(OVER_VOLTAGE.causes), "source": OVER_VOLTAGE.source,
+                        "remedies": list(OVER_VOLTAGE.remedies)}],
+        },
         "past_faults": {"why": "", "records": [
             {"name": "last fault", "code": "Er.002", "title": "Overvoltage", "error": "",
              "values": [{"key": "200A:16", "name": "DC voltage", "unit": "V", "value": 411.2,
@@ -78,13 +95,17 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
              "time": 1_700_000_000.0, "error": ""}
         ],
     }  # fmt: skip
+    reason = text("bundle.fault-of", axis="X0", faults="0x3210")
     evidence = Evidence(
-        reason="X0: 0x3210",
+        reason=reason,
         time=1_700_000_000.015,
         version="1",
         axes=[axis],
         links=[{"drive": "x0", "timeouts": 3}],
-        log=[Entry(1_700_000_000.0, "error", "x0", "", prose("it broke"))],
+        log=[
+            Entry(1_700_000_000.0, "error", "x0", "", prose("it broke")),
+            Entry(1_700_000_000.0, "error", "x0", "", reason),
+        ],
         history=[
             Value(1_700_000_000.0, "x0", "6041:00", 0x218),
             *(Value(1_700_000_000.0 + n, "x0", "6079:00", 310.0 + n) for n in range(3)),
@@ -93,25 +114,45 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
         streams=head["streams"],
         blocks=[(0, block(n)) for n in range(3)],
         clock=head["clock"],
-        names={("x0", "6079:00"): "X0 DC voltage [V]"},
+        names={
+            ("x0", "6079:00"): text(
+                "bundle.quantity-unit", axis="X0", name=profile_text("mms7", VOLTAGE), unit="V"
+            )
+        },
     )
     asyncio.run(build_apart(evidence, tmp_path / "b.zip"))
     assert [p.name for p in tmp_path.iterdir()] == ["b.zip"], "no leftovers"
     with zipfile.ZipFile(tmp_path / "b.zip") as archive:
         archive.extract("samples.sdrec", tmp_path)
         page = archive.read("index.html").decode()
+        chinese = archive.read("index.zh.html").decode()
         table = archive.read("samples.csv").decode().splitlines()
         assert "it broke" in archive.read("log.txt").decode()
+        assert "X0：0x3210" in archive.read("log.zh.txt").decode()
         assert (
             "2023-11-14T22:13:20.000+00:00,x0,6041:00,536" in archive.read("history.csv").decode()
         )
         assert "2002:01,Gain,20" in archive.read("parameters/x0.csv").decode()
     # Two channels of every cycle, and of what was read one by one that which changed.
     assert page.count("<polyline") == 3
-    assert "<h3>X0 DC voltage [V]</h3>" in page
+    assert f"<h3>X0 {VOLTAGE} [V]</h3>" in page
     assert "<td>last fault<td>Er.002 Overvoltage<td>DC voltage 411.2 V" in page
     assert "<td>second fault<td> <td>no answer" in page
     assert "310 … 312, 2.000 s" in page
+    assert f"Causes: {'; '.join(OVER_VOLTAGE.causes)}" in page
+    # The same in Chinese, with the profile's translations.
+    words = ProfileWords("mms7", "zh")
+    assert "<h1>X0：0x3210</h1>" in chinese
+    assert words(VOLTAGE) != VOLTAGE
+    assert f"<h3>X0 {words(VOLTAGE)} [V]</h3>" in chinese
+    assert f"可能原因：{'；'.join(map(words, OVER_VOLTAGE.causes))}" in chinese
+    assert f"处理方法：{'；'.join(map(words, OVER_VOLTAGE.remedies))}" in chinese
+    assert "<th>状态<td>故障" in chinese
+    assert "<th>数值为最新<td>是" in chinese
+    assert "<th>超时<td>3" in chinese
+    assert '<a href="index.html" lang="en">English</a>' in chinese
+    for english in ("Causes", "Remedies", "Signals", "Files", "No ", "parameters<", "yes"):
+        assert english not in chinese, english
     assert len(table) == 31
     with RecordingReader(tmp_path / "samples.sdrec") as reader:
         for n, each in enumerate(reader.blocks()):
@@ -137,7 +178,7 @@ def test_what_came_long_ago_is_no_evidence(tmp_path: Path, monkeypatch: pytest.M
         seen = []
         for after_s in (0.0, 11.0, 13.0):
             clock.time = lambda after_s=after_s: 1000.5 + after_s
-            seen.append(len((await armed._evidence("why", 1000.0)).history))
+            seen.append(len((await armed._evidence(prose("why"), 1000.0)).history))
         return seen
 
     assert asyncio.run(play()) == [1, 1, 0]
@@ -161,8 +202,8 @@ def test_what_a_full_disk_does_not_take_is_held_until_it_does(
 
     async def play() -> None:
         armed = capture.FaultCapture(bench, tmp_path / "bundles", lambda _drive, _text: None)
-        await armed._keep("X: 0x3210", 1_700_000_000.0)
-        await armed._keep("X: 0x7300", 1_700_000_001.0)
+        await armed._keep(prose("X: 0x3210"), 1_700_000_000.0)
+        await armed._keep(prose("X: 0x7300"), 1_700_000_001.0)
         await asyncio.sleep(0.05)
         assert armed.names() == []
         free[0] = 1 << 40

@@ -4671,7 +4671,8 @@ export interface components {
         BundleRequest: {
             /**
              * Reason
-             * @default asked for
+             * @description empty: made by hand
+             * @default
              */
             reason: string;
         };
@@ -14497,7 +14498,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -14506,7 +14507,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -14515,7 +14516,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -14638,7 +14639,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -14647,7 +14648,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -14656,7 +14657,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -14775,7 +14776,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -14784,7 +14785,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -14793,7 +14794,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -14918,7 +14919,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -14927,7 +14928,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -14936,7 +14937,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15058,7 +15059,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15067,7 +15068,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15076,7 +15077,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15199,7 +15200,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15208,7 +15209,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15217,7 +15218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15339,7 +15340,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15348,7 +15349,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15357,7 +15358,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15487,7 +15488,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15496,7 +15497,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15505,7 +15506,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15631,7 +15632,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15640,7 +15641,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15649,7 +15650,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15768,7 +15769,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15777,7 +15778,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15786,7 +15787,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -15905,7 +15906,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -15914,7 +15915,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -15923,7 +15924,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16045,7 +16046,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16054,7 +16055,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16063,7 +16064,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16182,7 +16183,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16191,7 +16192,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16200,7 +16201,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16323,7 +16324,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16332,7 +16333,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16341,7 +16342,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16460,7 +16461,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16469,7 +16470,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16478,7 +16479,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16601,7 +16602,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16610,7 +16611,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16619,7 +16620,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16742,7 +16743,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16751,7 +16752,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16760,7 +16761,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -16879,7 +16880,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -16888,7 +16889,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -16897,7 +16898,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17016,7 +17017,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17025,7 +17026,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17034,7 +17035,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17153,7 +17154,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17162,7 +17163,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17171,7 +17172,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17290,7 +17291,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17299,7 +17300,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17308,7 +17309,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17433,7 +17434,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17442,7 +17443,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17451,7 +17452,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17572,7 +17573,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17581,7 +17582,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17590,7 +17591,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17712,7 +17713,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17721,7 +17722,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17730,7 +17731,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17855,7 +17856,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -17864,7 +17865,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -17873,7 +17874,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -17995,7 +17996,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18004,7 +18005,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18013,7 +18014,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18138,7 +18139,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18147,7 +18148,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18156,7 +18157,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18278,7 +18279,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18287,7 +18288,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18296,7 +18297,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18419,7 +18420,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18428,7 +18429,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18437,7 +18438,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18556,7 +18557,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18565,7 +18566,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18574,7 +18575,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18693,7 +18694,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18702,7 +18703,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18711,7 +18712,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18840,7 +18841,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18849,7 +18850,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -18858,7 +18859,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -18984,7 +18985,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -18993,7 +18994,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19002,7 +19003,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19125,7 +19126,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19134,7 +19135,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19143,7 +19144,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19264,7 +19265,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19273,7 +19274,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19282,7 +19283,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19407,7 +19408,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19416,7 +19417,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19425,7 +19426,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19548,7 +19549,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19557,7 +19558,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19566,7 +19567,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19685,7 +19686,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19694,7 +19695,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19703,7 +19704,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19830,7 +19831,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19839,7 +19840,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19848,7 +19849,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -19974,7 +19975,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -19983,7 +19984,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -19992,7 +19993,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20113,7 +20114,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20122,7 +20123,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20131,7 +20132,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20252,7 +20253,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20261,7 +20262,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20270,7 +20271,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20391,7 +20392,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20400,7 +20401,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20409,7 +20410,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20530,7 +20531,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20539,7 +20540,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20548,7 +20549,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20669,7 +20670,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20678,7 +20679,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20687,7 +20688,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20808,7 +20809,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20817,7 +20818,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20826,7 +20827,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -20951,7 +20952,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -20960,7 +20961,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -20969,7 +20970,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21094,7 +21095,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21103,7 +21104,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21112,7 +21113,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21237,7 +21238,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21246,7 +21247,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21255,7 +21256,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21380,7 +21381,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21389,7 +21390,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21398,7 +21399,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21532,7 +21533,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21541,7 +21542,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21550,7 +21551,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21671,7 +21672,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21680,7 +21681,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21689,7 +21690,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21811,7 +21812,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21820,7 +21821,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21829,7 +21830,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -21950,7 +21951,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -21959,7 +21960,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -21968,7 +21969,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22093,7 +22094,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22102,7 +22103,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22111,7 +22112,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22232,7 +22233,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22241,7 +22242,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22250,7 +22251,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22375,7 +22376,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22384,7 +22385,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22393,7 +22394,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22512,7 +22513,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22521,7 +22522,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22530,7 +22531,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22651,7 +22652,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22660,7 +22661,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22669,7 +22670,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22790,7 +22791,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22799,7 +22800,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22808,7 +22809,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -22929,7 +22930,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -22938,7 +22939,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -22947,7 +22948,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23073,7 +23074,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23082,7 +23083,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23091,7 +23092,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23219,7 +23220,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23228,7 +23229,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23237,7 +23238,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23359,7 +23360,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23368,7 +23369,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23377,7 +23378,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23503,7 +23504,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23512,7 +23513,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23521,7 +23522,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23646,7 +23647,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23655,7 +23656,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23664,7 +23665,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23789,7 +23790,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23798,7 +23799,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23807,7 +23808,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -23932,7 +23933,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -23941,7 +23942,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -23950,7 +23951,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24075,7 +24076,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24084,7 +24085,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24093,7 +24094,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24227,7 +24228,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24236,7 +24237,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24245,7 +24246,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24370,7 +24371,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24379,7 +24380,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24388,7 +24389,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24513,7 +24514,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24522,7 +24523,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24531,7 +24532,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24658,7 +24659,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24667,7 +24668,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24676,7 +24677,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24801,7 +24802,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24810,7 +24811,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24819,7 +24820,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -24944,7 +24945,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -24953,7 +24954,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -24962,7 +24963,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25087,7 +25088,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25096,7 +25097,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25105,7 +25106,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25230,7 +25231,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25239,7 +25240,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25248,7 +25249,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25373,7 +25374,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25382,7 +25383,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25391,7 +25392,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25516,7 +25517,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25525,7 +25526,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25534,7 +25535,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25659,7 +25660,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25668,7 +25669,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25677,7 +25678,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25802,7 +25803,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25811,7 +25812,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25820,7 +25821,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -25941,7 +25942,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -25950,7 +25951,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -25959,7 +25960,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26084,7 +26085,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26093,7 +26094,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26102,7 +26103,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26227,7 +26228,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26236,7 +26237,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26245,7 +26246,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26370,7 +26371,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26379,7 +26380,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26388,7 +26389,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26513,7 +26514,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26522,7 +26523,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26531,7 +26532,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26656,7 +26657,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26665,7 +26666,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26674,7 +26675,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26799,7 +26800,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26808,7 +26809,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26817,7 +26818,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -26942,7 +26943,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -26951,7 +26952,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -26960,7 +26961,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27085,7 +27086,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27094,7 +27095,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27103,7 +27104,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27224,7 +27225,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27233,7 +27234,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27242,7 +27243,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27367,7 +27368,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27376,7 +27377,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27385,7 +27386,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27506,7 +27507,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27515,7 +27516,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27524,7 +27525,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27650,7 +27651,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27659,7 +27660,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27668,7 +27669,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27789,7 +27790,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27798,7 +27799,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27807,7 +27808,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -27932,7 +27933,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -27941,7 +27942,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -27950,7 +27951,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28075,7 +28076,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28084,7 +28085,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28093,7 +28094,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28214,7 +28215,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28223,7 +28224,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28232,7 +28233,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28357,7 +28358,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28366,7 +28367,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28375,7 +28376,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28497,7 +28498,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28506,7 +28507,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28515,7 +28516,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28641,7 +28642,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28650,7 +28651,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28659,7 +28660,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28780,7 +28781,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28789,7 +28790,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28798,7 +28799,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -28925,7 +28926,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -28934,7 +28935,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -28943,7 +28944,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29064,7 +29065,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29073,7 +29074,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29082,7 +29083,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29208,7 +29209,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29217,7 +29218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29226,7 +29227,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29347,7 +29348,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29356,7 +29357,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29365,7 +29366,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29490,7 +29491,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29499,7 +29500,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29508,7 +29509,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29629,7 +29630,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29638,7 +29639,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29647,7 +29648,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29772,7 +29773,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29781,7 +29782,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29790,7 +29791,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -29911,7 +29912,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -29920,7 +29921,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -29929,7 +29930,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30054,7 +30055,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30063,7 +30064,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30072,7 +30073,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30197,7 +30198,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30206,7 +30207,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30215,7 +30216,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30336,7 +30337,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30345,7 +30346,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30354,7 +30355,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30482,7 +30483,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30491,7 +30492,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30500,7 +30501,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30619,7 +30620,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30628,7 +30629,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30637,7 +30638,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30762,7 +30763,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30771,7 +30772,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30780,7 +30781,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -30905,7 +30906,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -30914,7 +30915,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -30923,7 +30924,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31048,7 +31049,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31057,7 +31058,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31066,7 +31067,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31191,7 +31192,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31200,7 +31201,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31209,7 +31210,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31334,7 +31335,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31343,7 +31344,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31352,7 +31353,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31477,7 +31478,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31486,7 +31487,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31495,7 +31496,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31618,7 +31619,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31627,7 +31628,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31636,7 +31637,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31759,7 +31760,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31768,7 +31769,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31777,7 +31778,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -31899,7 +31900,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -31908,7 +31909,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -31917,7 +31918,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32045,7 +32046,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32054,7 +32055,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32063,7 +32064,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32193,7 +32194,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32202,7 +32203,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32211,7 +32212,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32346,7 +32347,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32355,7 +32356,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32364,7 +32365,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32485,7 +32486,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32494,7 +32495,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32503,7 +32504,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32624,7 +32625,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32633,7 +32634,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32642,7 +32643,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32765,7 +32766,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32774,7 +32775,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32783,7 +32784,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -32906,7 +32907,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -32915,7 +32916,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -32924,7 +32925,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33043,7 +33044,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33052,7 +33053,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33061,7 +33062,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33185,7 +33186,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33194,7 +33195,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33203,7 +33204,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33322,7 +33323,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33331,7 +33332,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33340,7 +33341,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33459,7 +33460,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33468,7 +33469,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33477,7 +33478,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33600,7 +33601,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33609,7 +33610,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33618,7 +33619,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33739,7 +33740,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33748,7 +33749,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33757,7 +33758,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -33882,7 +33883,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -33891,7 +33892,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -33900,7 +33901,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34021,7 +34022,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34030,7 +34031,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34039,7 +34040,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34158,7 +34159,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34167,7 +34168,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34176,7 +34177,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34297,7 +34298,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34306,7 +34307,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34315,7 +34316,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34438,7 +34439,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34447,7 +34448,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34456,7 +34457,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34592,7 +34593,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34601,7 +34602,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34610,7 +34611,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34729,7 +34730,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34738,7 +34739,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34747,7 +34748,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -34868,7 +34869,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -34877,7 +34878,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -34886,7 +34887,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35005,7 +35006,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35014,7 +35015,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35023,7 +35024,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35148,7 +35149,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35157,7 +35158,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35166,7 +35167,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35287,7 +35288,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35296,7 +35297,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35305,7 +35306,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35426,7 +35427,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35435,7 +35436,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35444,7 +35445,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35565,7 +35566,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35574,7 +35575,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35583,7 +35584,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35704,7 +35705,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35713,7 +35714,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35722,7 +35723,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35841,7 +35842,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35850,7 +35851,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35859,7 +35860,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -35978,7 +35979,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -35987,7 +35988,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -35996,7 +35997,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36117,7 +36118,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36126,7 +36127,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36135,7 +36136,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36273,7 +36274,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36282,7 +36283,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36291,7 +36292,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36413,7 +36414,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36422,7 +36423,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36431,7 +36432,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36552,7 +36553,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36561,7 +36562,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36570,7 +36571,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36689,7 +36690,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36698,7 +36699,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36707,7 +36708,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36826,7 +36827,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36835,7 +36836,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36844,7 +36845,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -36969,7 +36970,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -36978,7 +36979,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -36987,7 +36988,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37106,7 +37107,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37115,7 +37116,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37124,7 +37125,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37246,7 +37247,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37255,7 +37256,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37264,7 +37265,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37387,7 +37388,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37396,7 +37397,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37405,7 +37406,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37530,7 +37531,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37539,7 +37540,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37548,7 +37549,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37667,7 +37668,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37676,7 +37677,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37685,7 +37686,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37804,7 +37805,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37813,7 +37814,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37822,7 +37823,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -37947,7 +37948,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -37956,7 +37957,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -37965,7 +37966,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38085,7 +38086,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38094,7 +38095,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38103,7 +38104,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38223,7 +38224,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38232,7 +38233,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38241,7 +38242,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38365,7 +38366,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38374,7 +38375,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38383,7 +38384,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38511,7 +38512,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38520,7 +38521,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38529,7 +38530,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38653,7 +38654,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38662,7 +38663,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38671,7 +38672,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38796,7 +38797,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38805,7 +38806,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38814,7 +38815,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -38935,7 +38936,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -38944,7 +38945,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -38953,7 +38954,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39076,7 +39077,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39085,7 +39086,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39094,7 +39095,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39217,7 +39218,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39226,7 +39227,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39235,7 +39236,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39356,7 +39357,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39365,7 +39366,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39374,7 +39375,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39493,7 +39494,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39502,7 +39503,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39511,7 +39512,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39636,7 +39637,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39645,7 +39646,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39654,7 +39655,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39774,7 +39775,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39783,7 +39784,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39792,7 +39793,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -39914,7 +39915,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -39923,7 +39924,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -39932,7 +39933,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40051,7 +40052,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40060,7 +40061,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40069,7 +40070,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40194,7 +40195,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40203,7 +40204,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40212,7 +40213,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40333,7 +40334,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40342,7 +40343,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40351,7 +40352,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40472,7 +40473,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40481,7 +40482,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40490,7 +40491,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40609,7 +40610,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40618,7 +40619,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40627,7 +40628,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40746,7 +40747,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40755,7 +40756,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40764,7 +40765,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -40883,7 +40884,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -40892,7 +40893,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -40901,7 +40902,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41026,7 +41027,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41035,7 +41036,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41044,7 +41045,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41163,7 +41164,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41172,7 +41173,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41181,7 +41182,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41304,7 +41305,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41313,7 +41314,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41322,7 +41323,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41441,7 +41442,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41450,7 +41451,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41459,7 +41460,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41578,7 +41579,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41587,7 +41588,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41596,7 +41597,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41715,7 +41716,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41724,7 +41725,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41733,7 +41734,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41854,7 +41855,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -41863,7 +41864,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -41872,7 +41873,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -41991,7 +41992,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42000,7 +42001,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42009,7 +42010,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42132,7 +42133,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42141,7 +42142,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42150,7 +42151,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42269,7 +42270,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42278,7 +42279,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42287,7 +42288,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42410,7 +42411,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42419,7 +42420,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42428,7 +42429,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42545,7 +42546,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42554,7 +42555,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42563,7 +42564,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42684,7 +42685,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42693,7 +42694,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42702,7 +42703,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42821,7 +42822,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42830,7 +42831,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42839,7 +42840,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -42958,7 +42959,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -42967,7 +42968,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -42976,7 +42977,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43095,7 +43096,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43104,7 +43105,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43113,7 +43114,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43242,7 +43243,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43251,7 +43252,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43260,7 +43261,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43381,7 +43382,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43390,7 +43391,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43399,7 +43400,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43522,7 +43523,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43531,7 +43532,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43540,7 +43541,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43659,7 +43660,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43668,7 +43669,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43677,7 +43678,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43799,7 +43800,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43808,7 +43809,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43817,7 +43818,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -43940,7 +43941,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -43949,7 +43950,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -43958,7 +43959,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -44081,7 +44082,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44090,7 +44091,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44099,7 +44100,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -44218,7 +44219,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44227,7 +44228,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44236,7 +44237,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -44359,7 +44360,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44368,7 +44369,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44377,7 +44378,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -44496,7 +44497,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44505,7 +44506,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44514,7 +44515,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
@@ -44633,7 +44634,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44642,7 +44643,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44651,7 +44652,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;

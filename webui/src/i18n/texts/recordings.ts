@@ -89,7 +89,6 @@ export const recordings = {
   ],
   'bundles.armed': ['Make one on every fault', '每次故障时生成'],
   'bundles.reason': ['Why', '原因'],
-  'bundles.byHand': ['made by hand', '手动生成'],
   'bundles.make': ['Make one now', '立即生成'],
   'bundles.none': ['No support bundles.', '没有支持包。'],
   'bundles.download': ['Download', '下载'],

@@ -19,7 +19,7 @@ export function Bundles() {
   const { data, problem, read } = useFetched<BundleList>(() => ask(api.GET('/api/v1/bundles')), [])
   const make = () =>
     act.run(async () => {
-      await ask(api.POST('/api/v1/bundles', { body: { reason: t('bundle.make') } }))
+      await ask(api.POST('/api/v1/bundles', { body: { reason: '' } }))
       await read()
     })
   return (

@@ -58,7 +58,7 @@ export function BundlesPanel() {
           loading={act.busy}
           onClick={() =>
             run(async () => {
-              const body = { reason: reason.trim() || t('bundles.byHand') }
+              const body = { reason: reason.trim() }
               await ask(api.POST('/api/v1/bundles', { body }))
               setReason('')
             })
