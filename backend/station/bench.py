@@ -398,6 +398,7 @@ class Bench:
     def _snapshot(self, drive_id: str, snapshot: Snapshot) -> None:
         if (connected := self.connected_drives.get(drive_id)) is not None:
             self.reconnection.seen(connected, snapshot)
+            self.buses.seen(connected.drive)
         for listener in self.on_snapshot:
             listener(drive_id, snapshot)
 

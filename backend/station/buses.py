@@ -35,6 +35,8 @@ class Buses:
         self.last_round_trip_ms: dict[str, float | None] = {}
         self._bench = bench
         self._opening = asyncio.Lock()
+        #: Whether the links of a drive were there at its last snapshot, by drive and port.
+        self._linked: dict[str, tuple[bool, ...]] = {}
 
     async def open(self, url: str) -> Link:
         """The link of the bus of this URL; opened at first use.
@@ -83,6 +85,18 @@ class Buses:
         return [
             url for url, link in self.opened.items() if any(p.link is link for p in drive.ports)
         ]
+
+    def seen(self, drive: Drive) -> None:
+        """Compare the links of a drive with those of its last snapshot.
+
+        Pages show them with the list of drives, which nothing else may send when a link comes or
+        goes.
+        """
+        now = tuple(port.link.quality(port.station).connected for port in drive.ports)
+        before = self._linked.get(drive.id)
+        self._linked[drive.id] = now
+        if before is not None and before != now:
+            self._bench.drives_changed()
 
     def url_of(self, port: Port) -> str:
         """The URL by which the bus of a port was opened, as entered by the user."""
