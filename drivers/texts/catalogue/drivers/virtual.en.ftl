@@ -43,7 +43,9 @@ virtual_no-permission-raw-sockets = no permission for raw sockets
 virtual_no-such-defect = bench file { $path }: no defect { QUOTED($value) }
     .remedy = name an axis of the file ({ $axes }) and one of { $limit }, as AXIS=DEFECT
 virtual_virtual-segment-ended = the virtual segment has ended: { $reason }
-virtual_virtual-segment-silent = the virtual segment is silent for { NUM($timeout_s, format: ".1f") } s
+    .remedy = start the virtual drives again
+virtual_virtual-segment-silent = no answer of the virtual segment within { NUM($timeout_s, format: ".1f") } s
+    .remedy = close other programs, then start again: the first start compiles the virtual drives and takes minutes on a busy computer
 virtual_cables-need-linux = virtual EtherCAT cables need Linux network namespaces
 virtual_cannot-join-namespaces = cannot join the namespaces of process { $pid }: { $cause }
 virtual_no-private-network = no private network here: { $reason }. Remedy: allow unprivileged user namespaces (sysctl kernel.unprivileged_userns_clone=1 or kernel.apparmor_restrict_unprivileged_userns=0; in a container, its security profile), or run as root

@@ -43,7 +43,9 @@ virtual_no-permission-raw-sockets = 没有使用原始套接字的权限
 virtual_no-such-defect = 调试台文件 { $path }：没有缺陷 { QUOTED($value) }
     .remedy = 请以“轴=缺陷”的形式给出文件中的轴（{ $axes }）和以下之一：{ $limit }
 virtual_virtual-segment-ended = 虚拟网段已结束：{ $reason }
-virtual_virtual-segment-silent = 虚拟网段已静默 { NUM($timeout_s, format: ".1f") } s
+    .remedy = 请重新启动虚拟驱动器
+virtual_virtual-segment-silent = 虚拟网段 { NUM($timeout_s, format: ".1f") } s 内无应答
+    .remedy = 请关闭其他程序后重新启动：首次启动需要编译虚拟驱动器，计算机繁忙时需要数分钟
 virtual_cables-need-linux = 虚拟 EtherCAT 电缆需要 Linux 网络命名空间
 virtual_cannot-join-namespaces = 无法进入进程 { $pid } 的命名空间：{ $cause }
 virtual_no-private-network = 此处无法建立私有网络：{ $reason }。处理：允许非特权用户命名空间（sysctl kernel.unprivileged_userns_clone=1 或 kernel.apparmor_restrict_unprivileged_userns=0；在容器中则修改其安全配置），或以 root 运行
