@@ -92,17 +92,21 @@ _REMARK = re.compile(r";|//|(?<!\S)#(?![xX])")
 #: Fields of ESI and EDS files with an upper limit.
 _MAXIMA = ("MaxValue", "MaxData", "HighLimit")
 _REAL32_MAX = 3.4028234e38
+#: Blanks between a sign and its number; a thousand or a fraction of three digits.
+_AFTER_SIGN = re.compile(r"^([+-])\s+")
+_TWO_WAYS = re.compile(r"[+-]?\d{1,3},\d{3}")
 
 
 def parse_number(text: str, place: str, report: ImportReport) -> int | float | None:
     """Parse a number in any of the notations found; None with a finding if it is not a number.
 
-    Empty text is None without a finding: many files leave defaults empty.
+    Empty text is None without a finding: many files leave defaults empty. Blanks inside a number
+    are not removed: ``1 2`` may be two numbers, or one with a thousands separator.
     """
     if text.isascii() and text.isdigit() and text[0] != "0" and len(text) <= _LONGEST_NUMBER:
         return int(text)
-    bare = text.split(";", 1)[0].strip().strip("\"'").replace("_", "").replace(" ", "")
-    bare = bare.replace("\N{MINUS SIGN}", "-")
+    bare = text.split(";", 1)[0].strip().strip("\"'").strip().replace("_", "")
+    bare = _AFTER_SIGN.sub(r"\1", bare.replace("\N{MINUS SIGN}", "-"))
     if not bare or bare in ("-", "0x", "0X"):
         return None
     if len(bare) > _LONGEST_NUMBER:
@@ -136,6 +140,9 @@ def _decimal(bare: str, text: str, place: str, report: ImportReport) -> int | fl
     if re.fullmatch(r"[+-]?[0-9a-fA-F]+[hH]", bare):
         report.repaired(place, "description.hexadecimal", value=bare)
         return int(bare[:-1], 16)
+    if _TWO_WAYS.fullmatch(bare):
+        report.left_out(place, "description.two-ways", value=bare)
+        return None
     if re.fullmatch(r"[+-]?\d+,\d+", bare):
         report.repaired(place, "description.decimal-comma", value=bare)
         bare = bare.replace(",", ".")

@@ -218,3 +218,24 @@ def test_a_compact_array_has_no_more_than_254_members(count: str, last: int) -> 
     assert [k for k in keys if k.startswith("2100")] == [
         f"2100:{n:02X}" for n in range(1, last + 1)
     ]
+
+
+@pytest.mark.parametrize(
+    "number", ["1 2", "1\t2", "1 000", "- 1 2", "0x1 2", "1\u00a0000", "1,000"]
+)
+def test_a_number_that_may_be_another_one_is_left_out(number: str) -> None:
+    """ "1 2" became 12, and "1,000" became 1."""
+    entry = f"[2100]\nParameterName=Rate\nDataType=0x0006\nAccessType=rw\nDefaultValue={number}\n"
+    imported = import_file(with_object(entry), "x.eds")
+    assert imported.profile.by_key["2100:00"].default_raw is None
+    found = [f for f in imported.report.findings if f.outcome == "left out"]
+    assert [f.code for f in found] == [
+        "description.two-ways" if "," in number else "description.no-number"
+    ]
+    assert "DefaultValue" in found[0].place
+
+
+@pytest.mark.parametrize("number", ["12", " 12 ", "0xC", "+ 12", '" 12 "', "1_2", "12 ; Hz"])
+def test_blanks_around_a_number_change_none(number: str) -> None:
+    entry = f"[2100]\nParameterName=Rate\nDataType=0x0006\nAccessType=rw\nDefaultValue={number}\n"
+    assert import_file(with_object(entry), "x.eds").profile.by_key["2100:00"].default_raw == 12

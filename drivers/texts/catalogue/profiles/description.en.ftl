@@ -89,6 +89,7 @@ description_too-many-entries = the drive lists more than { $entries } entries, m
 description_too-many-objects = objects from { NUM($index, format: "04X") }h on: too many
 description_too-much-memory = reading it takes more than the { $limit_mib } MiB of memory that an import may use
 description_transition-unknown = the init command to { NUM($index, format: "04X") }h:{ $subindex } on transition { QUOTED($transition) } has no valid transition or subindex
+description_two-ways = { $value } can be read as a thousand or as a fraction
 description_type-as-bytes = data type { NUM($type, format: "#04x") } is shown as bytes
 description_type-by-length = data type { NUM($type, format: "#06x") } is unknown, taken by its length
 description_type-by-name = data type { $type } is written by its name

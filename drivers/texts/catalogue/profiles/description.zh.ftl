@@ -89,6 +89,7 @@ description_too-many-entries = 驱动器列出的条目超过 { $entries } 个�
 description_too-many-objects = 从 { NUM($index, format: "04X") }h 起的对象：数量过多
 description_too-much-memory = 读取它需要的内存超过导入可用的 { $limit_mib } MiB
 description_transition-unknown = 在转换 { QUOTED($transition) } 时对 { NUM($index, format: "04X") }h:{ $subindex } 的初始化命令没有有效的转换或子索引
+description_two-ways = { $value } 可读作千位数或小数
 description_type-as-bytes = 数据类型 { NUM($type, format: "#04x") } 按字节显示
 description_type-by-length = 数据类型 { NUM($type, format: "#06x") } 未知，按其长度确定
 description_type-by-name = 数据类型 { $type } 以名称写出
