@@ -2,9 +2,10 @@
 
 Accepted are lists with a heading (``key`` or ``index`` and ``subindex``, with ``raw`` or ``value``)
 and lists without one (``key, raw`` or ``index, subindex, raw``), where a line with several numbers
-that differ is refused. The separator is a comma, semicolon or tabulator; lines that begin with
-``#`` are comments. ``raw`` is the value as transferred; ``value`` is in the parameter's unit. A bad
-line does not affect the others.
+that differ is refused. A list whose heading has several columns of values (set and actual value) is
+refused: a person must decide which of them is meant. The separator is a comma, semicolon or
+tabulator; lines that begin with ``#`` are comments. ``raw`` is the value as transferred; ``value``
+is in the parameter's unit. A bad line does not affect the others.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ def read_csv(data: bytes, profile: Profile, name: str = "the file") -> Parameter
         for cells in rows:
             number = places[rows.line_num - 1]
             if columns is None:
-                columns = _headed(cells)
+                columns = _headed(cells, name)
                 if columns is not None:
                     continue
                 columns = _bare(cells)
@@ -165,16 +166,25 @@ def _separator(content: str) -> str:
     return next((mark for mark in ("\t", ";") if mark in line), ",")
 
 
-def _headed(cells: list[str]) -> _Columns | None:
-    """Columns by their headings; None where this line is not a heading."""
+def _headed(cells: list[str], name: str) -> _Columns | None:
+    """Columns by their headings; None where this line is not a heading.
+
+    Raises:
+        BadSet: several columns of values.
+    """
     places: dict[str, int] = {}
+    values: dict[str, list[str]] = {"raw": [], "value": []}
     for place, cell in enumerate(cells):
         title = cell.strip().lower()
         for column, names in _HEADINGS.items():
             if title in names:
                 places.setdefault(column, place)
+                values.get(column, []).append(cell.strip())
     if not ({"key", "index"} & places.keys() and {"raw", "value"} & places.keys()):
         return None
+    for titles in values.values():
+        if len(titles) > 1:
+            raise BadSet("sets.several-columns", name=name, columns=", ".join(titles))
     at = {column: places.get(column, -1) for column in _HEADINGS}
     return _Columns(at["key"], at["index"], at["subindex"], at["raw"], at["value"], at["unit"])
 
@@ -200,9 +210,12 @@ def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: s
             # Of another axis, a limit, or the raw value in a further column.
             words = ", ".join(word.strip()[:12] for word in numbers[:6])
             raise Unsuitable(text("sets.line-several-numbers", key=parameter.key, words=words))
-    if raw:
-        return _made(parameter, _value(parameter, raw, separator))
     written = cell(columns.value)
+    if raw:
+        made = _made(parameter, _value(parameter, raw, separator))
+        if _same_unit(cell(columns.unit), parameter.unit):
+            _check_alike(parameter, made, written, separator)
+        return made
     if not written:
         raise Unsuitable(text("sets.line-no-value", key=parameter.key))
     value = _value(parameter, written, separator)
@@ -214,6 +227,30 @@ def _reading(cells: list[str], columns: _Columns, profile: Profile, separator: s
             raise Unsuitable(text("sets.line-has-unit", **facts))
         raise Unsuitable(text("sets.line-other-unit", **facts, ours=parameter.unit))
     return _made(parameter, parameter.to_raw(value))
+
+
+def _check_alike(parameter: Parameter, made: Reading, written: str, separator: str) -> None:
+    """Check a value in the parameter's unit against the raw one beside it, within its last digit.
+
+    A person may have changed only one of them.
+
+    Raises:
+        Unsuitable: they differ.
+    """
+    if not written or isinstance(made.value, str) or made.value is None:
+        return
+    try:
+        value = _value(parameter, written, separator)
+    except Unsuitable:
+        return
+    if isinstance(value, str):
+        return
+    digits, _, power = written.lower().partition("e")
+    decimals = len(re.split(r"[.,]", digits)[-1]) if re.search(r"[.,]", digits) else 0
+    last = 0.0 if written[:2].lower() == "0x" else 10.0 ** (int(power or 0) - decimals)
+    if abs(value - made.value) > 0.51 * last + 1e-6 * abs(made.value):
+        facts = {"raw": made.raw, "value": made.value, "written": written[:40]}
+        raise Unsuitable(text("sets.line-raw-and-value", key=made.key, **facts))
 
 
 def _made(parameter: Parameter, raw: Raw) -> Reading:

@@ -178,3 +178,30 @@ def test_several_numbers_without_a_heading_are_not_guessed(
 )
 def test_one_number_and_words_behind_it_are_plain(profile: Profile, line: str) -> None:
     assert values(profile, f"{line}\n") == {"2005:03": 350}
+
+
+@pytest.mark.parametrize(
+    "heading", ["key;Set value;Actual value", "key;Actual value;Set value", "key;raw;data"]
+)
+def test_of_several_columns_of_values_none_is_chosen(profile: Profile, heading: str) -> None:
+    """The first one was taken: the actual values of a machine, for those that it should have."""
+    with pytest.raises(BadSet, match="several columns of values") as error:
+        read_csv(f"{heading}\n2005:03;35;36\n".encode(), profile, "list.csv")
+    assert all(title in str(error.value) for title in heading.split(";")[1:])
+    assert "delete all of these columns but the one" in str(error.value.remedy)
+
+
+@pytest.mark.parametrize("value", ["36.0", "34.9", "0x24"])
+def test_a_value_that_was_changed_without_its_raw_value_is_refused(
+    profile: Profile, value: str
+) -> None:
+    """The export has both; a change of the value alone in a spreadsheet was without effect."""
+    found = read_csv(f"key,value,raw\n2100:00,5,5\n2005:03,{value},350\n".encode(), profile)
+    assert [r.key for r in found.readings] == ["2100:00"]
+    assert "2005:03: raw 350 is 35.0 in the unit" in found.problems[0].words()
+
+
+@pytest.mark.parametrize("value", ["35.0", "35", "3.5e1", "many", "", "34.7,350,kHz"])
+def test_a_value_beside_its_raw_value_may_have_fewer_digits(profile: Profile, value: str) -> None:
+    row = value if "," in value else f"{value},350,Hz"
+    assert values(profile, f"key,value,raw,unit\n2005:03,{row}\n") == {"2005:03": 350}
