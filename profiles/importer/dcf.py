@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from profiles.importer.eds import MAX_BYTES, identity_of
+from profiles.importer.eds import MAX_BYTES, compare_with_lists, identity_of
 from profiles.importer.eds_sections import (
     COMPACT,
+    LINE_END,
     OBJECT,
     SUBOBJECT,
     Section,
@@ -34,6 +36,11 @@ class ConfiguredValue:
     type: DataType | None = None
 
 
+#: Headings of an object's section, or of one of its subindices.
+_ANY_OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?(?:$|\s*_?sub)")
+_VALUE_LINE = re.compile(r"\s*(parametervalue|\d{1,3})\s*=", re.I)
+
+
 def is_dcf(data: bytes) -> bool:
     """Return whether the data look like a DCF or EDS: lists in other formats lack such sections."""
     start = data[:8192].lower()
@@ -49,7 +56,10 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
         ImportFailed: too large, or no object has a value.
     """
     check_size(data, MAX_BYTES, name)
-    sections = read_sections(decode_text(data, name, report), name, report)
+    text = _without_cut(decode_text(data, name, report), name, report)
+    sections = read_sections(text, name, report)
+    present = {int(match[1], 16) for title in sections if (match := _ANY_OBJECT.match(title))}
+    compare_with_lists(sections, name, present, report)
     node_id = node_id_of(sections, name)
     found = [
         replace(value, text=_of_node(value, node_id, name, report))
@@ -58,6 +68,16 @@ def read_dcf_values(data: bytes, name: str, report: ImportReport) -> Iterator[Co
     if not found:
         raise ImportFailed("description.no-values", file=name)
     return iter(found)
+
+
+def _without_cut(text: str, name: str, report: ImportReport) -> str:
+    """Leave out a value in a last line without line end: of 12000, a cut file may have 12."""
+    lines = re.split(r"(?<=[\r\n])", text)
+    if not _VALUE_LINE.match(lines[-1]):
+        return text
+    place = f"{name}:{len(LINE_END.split(text))}"
+    report.left_out(place, "description.cut-off", line=lines[-1].strip()[:60])
+    return "".join(lines[:-1])
 
 
 def read_dcf_identity(data: bytes, name: str) -> tuple[int | None, int | None]:

@@ -161,7 +161,8 @@ class _Entries:
                 self._report.left_out(self._name, "description.too-many-objects", index=index)
                 break
             entries += self._object(index)
-        self._compare_with_lists({e.index for e in entries})
+        present = {e.index for e in entries}
+        compare_with_lists(self._sections, self._name, present, self._report)
         if self._configured:
             self._report.noted(self._name, "description.configured-values", values=self._configured)
         return entries
@@ -299,27 +300,29 @@ class _Entries:
         self._report.left_out(place, "description.type-code-unknown", type=code)
         return None
 
-    def _compare_with_lists(self, present: set[int]) -> None:
-        """Note differences from the lists of objects, which are often wrong; the sections count."""
-        for title in ("mandatoryobjects", "optionalobjects", "manufacturerobjects"):
-            section = self._sections.get(title)
-            if section is None:
-                continue
-            place = f"{self._name}:{section.line} [{title}]"
-            listed = [
-                int(number)
-                for key, text in section.values.items()
-                if key.isdecimal()
-                and (number := parse_number(text, place, self._report)) is not None
-            ]
-            announced = parse_number(section.get("supportedobjects"), place, self._report)
-            if announced is not None and announced != len(listed):
-                self._report.noted(
-                    place, "description.objects-differ", announced=announced, listed=len(listed)
-                )
-            for index in sorted(set(listed) - present):
-                if 0x1000 <= index <= 0xFFFF:
-                    self._report.noted(place, "description.listed-not-described", index=index)
+
+def compare_with_lists(
+    sections: dict[str, Section], name: str, present: set[int], report: ImportReport
+) -> None:
+    """Note differences from the lists of objects, which are often wrong; the sections count."""
+    for title in ("mandatoryobjects", "optionalobjects", "manufacturerobjects"):
+        section = sections.get(title)
+        if section is None:
+            continue
+        place = f"{name}:{section.line} [{title}]"
+        listed = [
+            int(number)
+            for key, text in section.values.items()
+            if key.isdecimal() and (number := parse_number(text, place, report)) is not None
+        ]
+        announced = parse_number(section.get("supportedobjects"), place, report)
+        if announced is not None and announced != len(listed):
+            report.noted(
+                place, "description.objects-differ", announced=announced, listed=len(listed)
+            )
+        for index in sorted(set(listed) - present):
+            if 0x1000 <= index <= 0xFFFF:
+                report.noted(place, "description.listed-not-described", index=index)
 
 
 def _mapping(section: Section, parent: Section, access_text: str) -> PdoMapping:

@@ -10,7 +10,7 @@ from profiles.importer.values import parse_number, without_remark
 
 _MAX_LINES = 400_000
 #: Other characters that Python treats as line ends occur within texts.
-_LINE = re.compile(r"\r\r\n|\r\n|\n|\r")
+LINE_END = re.compile(r"\r\r\n|\r\n|\n|\r")
 
 OBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?$")
 SUBOBJECT = re.compile(r"(?:0x)?([0-9a-f]{4})h?\s*_?sub\s*_?(?:0x)?([0-9a-f]{1,2})$")
@@ -39,7 +39,7 @@ def read_sections(text: str, name: str, report: ImportReport) -> dict[str, Secti
     """Return sections by lower-case heading; of duplicates the first counts."""
     sections: dict[str, Section] = {}
     current: Section | None = None
-    for number, raw in enumerate(_LINE.split(text)[:_MAX_LINES], start=1):
+    for number, raw in enumerate(LINE_END.split(text)[:_MAX_LINES], start=1):
         line = raw.strip().strip("\ufeff\0\x1a")
         place = f"{name}:{number}"
         if not line or line[0] in ";#" or line.startswith("//"):

@@ -270,7 +270,7 @@ def _profile_of(data: bytes, name: str, product_code: int | None) -> Profile:
     try:
         return import_file(data, name, product_code=product_code).profile
     except ImportFailed as error:
-        raise NotAllowed(failure_text(error)) from error
+        raise NotAllowed(failure_text(error), remedy="command.see-not-listed") from error
 
 
 def _segment(link: Link) -> EthercatLink:

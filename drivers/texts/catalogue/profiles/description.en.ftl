@@ -10,6 +10,7 @@ description_count-left-out = { $count } left out
 description_count-not-listed = { $count } more not listed
 description_count-noted = { $count } noted
 description_count-repaired = { $count } repaired
+description_cut-off = { QUOTED($line) } is the last line and has no line end: the file may be cut off, and the value is not used
 description_decimal-comma = { $value } has a decimal comma
 description_decimal-point = { $name } { NUM($value, format: ".1f") } is written with a decimal point
 description_default-outside-limits = { $key }: default { $default } is outside its own limits

@@ -10,6 +10,7 @@ description_count-left-out = 忽略 { $count } 项
 description_count-not-listed = 另有 { $count } 项未列出
 description_count-noted = 注意 { $count } 项
 description_count-repaired = 修复 { $count } 项
+description_cut-off = { QUOTED($line) } 是最后一行且没有换行符：文件可能被截断，不使用该值
 description_decimal-comma = { $value } 使用逗号作为小数点
 description_decimal-point = { $name } { NUM($value, format: ".1f") } 带有小数点
 description_default-outside-limits = { $key }：默认值 { $default } 超出其自身的限值
