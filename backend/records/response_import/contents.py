@@ -2,7 +2,8 @@
 
 Text: columns separated by comma, semicolon, tab, bar or blanks; decimal point or comma; any lines
 before the table (makers' scopes write several); UTF-8, UTF-16 or Latin-1; also compressed by gzip.
-MATLAB: up to v7. A file that is too large is refused before it is unpacked in memory.
+Times may be numbers or clock texts. JSON: arrays, rows or signals. MATLAB: up to v7. A file that is
+too large is refused before it is unpacked in memory.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from backend.analysis.signals.arrays import FloatArray
+from backend.records.response_import.clock_texts import ClockTexts
 from backend.records.response_import.errors import BadRecording
+from backend.records.response_import.json_tables import is_json, read_json
 from backend.records.response_import.matlab import read_matlab
 from drivers.texts import limits
 from drivers.texts.message import text as message
@@ -53,6 +56,8 @@ class Table:
     form: str
     facts: tuple[tuple[str, str], ...] = ()
     clocks: tuple[int, ...] = ()
+    clock_texts: frozenset[int] = frozenset()
+    """Columns that were times of day or dates; they are in seconds."""
 
     @property
     def rows(self) -> int:
@@ -77,7 +82,25 @@ def read_table(data: bytes, name: str) -> Table:
         names, columns = found
         return Table(names, columns, 0, "MAT")
     _refuse_known(data, name)
-    return _from_text(_decoded(data, name), name)
+    text = _decoded(data, name)
+    return _from_json(text, name) if is_json(text) else _from_text(text, name)
+
+
+def _from_json(text: str, name: str) -> Table:
+    found = read_json(text, name)
+    if len(found.columns) > MAX_COLUMNS:
+        raise BadRecording(
+            "import.columns", value=len(found.columns), limit=str(MAX_COLUMNS), name=name
+        )
+    return Table(
+        tuple(found.names),
+        tuple(found.columns),
+        0,
+        "JSON",
+        (),
+        tuple(found.clocks) if found.own_times else (),
+        frozenset(found.clock_texts),
+    )
 
 
 def _unpacked(data: bytes, name: str) -> bytes:
@@ -237,16 +260,19 @@ def _from_text(text: str, name: str) -> Table:
             limit=message("limit.lines", count=MAX_ROWS),
             name=name,
         )
-    layout = _layout(lines[:_HEAD_LINES], name)
+    clock = ClockTexts(lines, _HEAD_LINES)
+    layout = _layout(list(clock.lines[:_HEAD_LINES]), name)
     if layout.width > MAX_COLUMNS:
         raise BadRecording("import.columns", value=layout.width, limit=str(MAX_COLUMNS), name=name)
-    rows = lines[layout.first :]
+    rows = list(clock.lines[layout.first :])
     while rows and _no_row(rows[-1], layout):
         rows.pop()
     columns = _numbers(rows, layout, name)
+    by_clock = clock.columns(layout.first, _split(rows[0] if rows else "", layout.separator))
+    columns = tuple(clock.seconds(c) if i in by_clock else c for i, c in enumerate(columns))
     head = lines[: layout.first]
     names, clocks = _scope_names(head, layout) or (_names(head, layout), ())
-    return Table(names, columns, layout.first + 1, _form(layout), _facts(head), clocks)
+    return Table(names, columns, layout.first + 1, _form(layout), _facts(head), clocks, by_clock)
 
 
 def _no_row(line: str, layout: _Layout) -> bool:

@@ -30,7 +30,7 @@ def preview(data: bytes, name: str) -> dict[str, object]:
                 "high": float(np.max(good)) if good.size else 0.0,
                 "missing": int(values.size - good.size),
                 "rises": bool(good.size > 1 and np.all(np.diff(good) > 0)),
-                "unit": unit_in(table.names[i]),
+                "unit": "s" if i in table.clock_texts else unit_in(table.names[i]),
                 "curve": good[::step][:_CURVE].tolist(),
             }
         )

@@ -144,7 +144,7 @@ def signals_of(
         assert sample_rate_hz is not None
         _check_rate(sample_rate_hz, name, text("import.sample-rate"))
         return Signals(u, y, sample_rate_hz, table.names[first], table.names[second], "rate")
-    unit = time_unit or unit_in(table.names[at])
+    unit = "s" if at in table.clock_texts else time_unit or unit_in(table.names[at])
     same = (np.diff(u) == 0.0) & (np.diff(y) == 0.0)
     rate, kept, jitter = _clock(columns[0] * TIME_UNITS[unit], same, name, table, at, unit)
     return Signals(

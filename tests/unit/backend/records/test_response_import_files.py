@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gzip
 import io
+import json
 import os
+from datetime import datetime, timedelta
 
 import numpy as np
 import pytest
@@ -350,3 +352,151 @@ def test_units_make_nm_and_rad_per_second() -> None:
         scale_of("A", "rad/s", 2.39, None, None)
     with pytest.raises(BadRecording, match="not known"):
         scale_of("furlong", "rad/s", None, None, None)
+
+
+def _clocked(form: str, begin: datetime, separator: str = ",", digits: int = 3) -> str:
+    """The recording with clock texts; ``form`` is that of `strftime`, without the fraction."""
+    rows = []
+    for i, (u, y) in enumerate(zip(U, Y, strict=True)):
+        at = begin + timedelta(milliseconds=i)
+        clock = f"{at.strftime(form)}.{at.microsecond:06d}"[: digits - 6 or None]
+        rows.append(separator.join((clock, f"{u:.6g}", f"{y:.6g}")))
+    return separator.join(("Time [ms]", "in", "out")) + "\n" + "\n".join(rows) + "\n"
+
+
+NOON = datetime(2026, 11, 28, 12, 0, 59, 700_000)
+BEFORE_MIDNIGHT = datetime(2026, 2, 28, 23, 59, 59, 900_000)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(_clocked("%H:%M:%S", NOON), id="time of day"),
+        pytest.param(_clocked("%H:%M:%S", BEFORE_MIDNIGHT, ";"), id="over midnight"),
+        pytest.param(_clocked("%Y-%m-%dT%H:%M:%S", BEFORE_MIDNIGHT, "\t", 6), id="ISO 8601"),
+        pytest.param(_clocked("%Y-%m-%d %H:%M:%S", BEFORE_MIDNIGHT, " "), id="between blanks"),
+        pytest.param(_clocked("%d.%m.%Y %H:%M:%S", BEFORE_MIDNIGHT, ";"), id="day first"),
+        pytest.param(
+            _clocked("%H:%M:%S", NOON, ";").replace(".", ",").replace("Time", "Zeit"), id="comma"
+        ),
+        pytest.param(
+            "Start: 12:00:00.000\n" + _clocked("%Y-%m-%dT%H:%M:%S", NOON),
+            id="a clock in the head",
+        ),
+    ],
+)
+def test_clock_texts_are_times(data: str) -> None:
+    """ "12:00:01.234" was no number, so the file had no table."""
+    found = read(data)
+    check(found)
+    assert found.time_unit == "s"
+
+
+def test_a_zone_of_the_clock_may_change_and_the_time_goes_on() -> None:
+    lines = _clocked("%Y-%m-%dT%H:%M:%S", datetime(2026, 10, 25, 2, 59, 59, 800_000)).splitlines()
+    # At three o'clock the clock goes back by an hour, and its zone says so.
+    zoned = [lines[0]]
+    for line in lines[1:]:
+        clock, rest = line.split(",", 1)
+        summer = "T02:" in clock
+        zone = "+02:00" if summer else "+01:00"
+        zoned.append(f"{clock.replace('T03:', 'T02:')}{zone},{rest}")
+    check(read("\n".join(zoned)))
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        # The month or the day first: nobody knows.
+        (_clocked("%m/%d/%Y %H:%M:%S", NOON, ";"), "no table"),
+        (_clocked("%I:%M:%S", NOON, ";").replace(";", " PM;"), "no table|no number"),
+        (_clocked("%H:%M:%S", NOON).replace("12:00:59.900", "12:00:59.9x0"), "line 202.*column 1"),
+        (_clocked("%H:%M:%S", NOON).replace("12:00:59.900", "2026-02-30 12:00:59.900"), "line 202"),
+    ],
+)
+def test_a_clock_that_can_be_read_in_two_ways_is_refused(data: str, said: str) -> None:
+    with pytest.raises(BadRecording, match=said) as error:
+        read(data)
+    assert error.value.remedy
+
+
+TIMES, IN, OUT = T.tolist(), U.tolist(), Y.tolist()
+ISO = [(NOON + timedelta(milliseconds=i)).isoformat(timespec="milliseconds") for i in range(N)]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param({"in": IN, "out": OUT, "time": TIMES}, id="arrays by name"),
+        pytest.param(
+            {"meta": {"rate": 1}, "data": {"time": TIMES, "in": IN, "out": OUT}}, id="deeper"
+        ),
+        pytest.param({"time": ISO, "in": IN, "out": OUT}, id="clock texts"),
+        pytest.param(
+            [{"time": t, "in": u, "out": y} for t, u, y in zip(TIMES, IN, OUT, strict=True)],
+            id="objects",
+        ),
+        pytest.param(
+            [["time", "in", "out"], *map(list, zip(TIMES, IN, OUT, strict=True))], id="rows"
+        ),
+        pytest.param(
+            {"columns": ["time", "in", "out"], "data": list(zip(TIMES, IN, OUT, strict=True))},
+            id="table",
+        ),
+        pytest.param(
+            {
+                "signals": [
+                    {"name": n, "t": TIMES, "values": v} for n, v in (("in", IN), ("out", OUT))
+                ]
+            },
+            id="signals",
+        ),
+        pytest.param(
+            {
+                "series": [
+                    {"name": n, "data": list(zip(TIMES, v, strict=True))}
+                    for n, v in (("in", IN), ("out", OUT))
+                ]
+            },
+            id="pairs",
+        ),
+        pytest.param(
+            {"in": {"time": TIMES, "values": IN}, "out": {"time": TIMES, "values": OUT}},
+            id="by signal",
+        ),
+    ],
+)
+def test_json_in_many_forms_is_one_recording(content: object) -> None:
+    table = read_table(json.dumps(content).encode(), "trace.json")
+    assert (table.form, set(table.names)) == ("JSON", {"time", "in", "out"})
+    check(read(json.dumps(content), "time", "in", "out"))
+    check(read(b"\xef\xbb\xbf" + json.dumps(content, indent=1).encode(), "time", "in", "out"))
+
+
+def test_json_signals_with_other_times_are_not_one_recording() -> None:
+    later = [t + 0.0005 for t in TIMES]
+    signals = [{"name": "in", "t": TIMES, "y": IN}, {"name": "out", "t": later, "y": OUT}]
+    with pytest.raises(BadRecording, match=r"other times|sampled at"):
+        read(json.dumps(signals), "1", "in", "out")
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ('{"time": [0, 1', "damaged JSON: line 1"),
+        ("[" * 100_000, "nested|damaged JSON"),
+        ('{"a": "b"}', "no arrays of numbers"),
+        ('{"a": [1, 2]}', "no arrays of numbers"),
+        ('{"time": [0, 1], "in": [1, "x"]}', "'in', entry 2: 'x' is no number"),
+        ('{"time": [0, 1], "in": [1, {"v": 2}]}', "'in', entry 2"),
+        ('{"time": [0, 1], "in": [1, 1' + "0" * 400 + "]}", "'in', entry 2"),
+    ],
+)
+def test_json_that_is_no_recording_is_refused_with_its_place(data: str, said: str) -> None:
+    with pytest.raises(BadRecording, match=said) as error:
+        read_table(data.encode(), "trace.json")
+    assert error.value.remedy
+
+
+def test_a_head_in_brackets_is_no_json() -> None:
+    check(read("[Header]\nstate=1\n[Data]\n" + text()))
