@@ -1,11 +1,13 @@
 import { useCallback, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
-import type { LibraryEntry, MessageInfo, Problem, TagCount } from '../../api/schema'
+import type { LibraryEntry, LibraryPage, MessageInfo, Problem, TagCount } from '../../api/schema'
 import { useLink } from '../../live/store'
 import { useSearch } from '../../widgets/useSearch'
 import { type Filters, queryOf } from './filters'
 
 const PAGE = 50
+/** The server gives at most this many at once. */
+const LARGEST = 500
 
 /** What fits the filters, newest first; asked again a moment after a filter changed. */
 export function useLibrary(filters: Filters) {
@@ -27,10 +29,18 @@ export function useLibrary(filters: Filters) {
     const overtaken = () => present.current !== key || turn.current !== own
     const [wanted, most] = JSON.parse(key) as [Filters, number]
     try {
-      const query = queryOf(wanted, most)
-      const page = await ask(api.GET('/api/v1/library', { params: { query } }))
-      if (overtaken()) return
-      setEntries(page.entries)
+      const known = new Map<number, LibraryEntry>()
+      let page: LibraryPage
+      let offset = 0
+      do {
+        const query = { ...queryOf(wanted, Math.min(LARGEST, most - offset)), offset }
+        page = await ask(api.GET('/api/v1/library', { params: { query } }))
+        if (overtaken()) return
+        // One that was stored meanwhile moves the others on: none is listed twice.
+        for (const entry of page.entries) known.set(entry.id, entry)
+        offset += LARGEST
+      } while (offset < most && offset < page.total)
+      setEntries([...known.values()])
       setTotal(page.total)
       setProblems(page.problems)
       setMessages(page.problem_messages ?? [])
@@ -42,6 +52,6 @@ export function useLibrary(filters: Filters) {
     }
   }, [key])
   useSearch(refresh, open)
-  const more = () => setLimit((before) => Math.min(500, before + PAGE))
+  const more = () => setLimit((before) => before + PAGE)
   return { entries, total, tags, problems, messages, shared, problem, refresh, more }
 }
