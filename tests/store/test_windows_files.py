@@ -11,11 +11,11 @@ import pytest
 from backend.axes.restore import store as restore_store
 from backend.foundation.store.files import StorageFailed, write_atomically
 from backend.records.library.backup import restore as restoring
-from backend.records.library.backup.backup import make_backup
+from backend.records.library.backup.backup import BackupFailed, make_backup
 from backend.records.library.backup.restore import restore
 from profiles.replacing import move_into_place
 from tests.store.test_backup import Station, reopened
-from tests.support.windows_files import keep_rules
+from tests.support.windows_files import ignore_case, keep_rules
 
 
 @pytest.fixture
@@ -59,6 +59,28 @@ def test_a_station_is_saved_and_put_back(windows: None, station: Station, tmp_pa
     assert (replaced.aside / "bench.json").exists()
     for again in reopened(tmp_path / "new"):
         again.check()
+
+
+def test_two_files_that_the_disk_takes_for_one_are_named_and_nothing_is_lost(
+    station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a station on Linux that an older servodeck ran, to a laptop."""
+    scope = station.store.folder / "scope/setups"
+    scope.mkdir(parents=True)
+    for name in ("Speed.json", "speed.json"):
+        (scope / name).write_text("{}")
+    make_backup(station.store, tmp_path / "b.zip")
+    (tmp_path / "new").mkdir()
+    with monkeypatch.context() as inside:
+        ignore_case(inside)
+        with pytest.raises(
+            BackupFailed, match=r"takes \S*[Ss]peed.json and [Ss]peed.json"
+        ) as caught:
+            restore(tmp_path / "b.zip", tmp_path / "new")
+    assert "nothing was changed" in str(caught.value)
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["servodeck.lock"]
+    restore(tmp_path / "b.zip", tmp_path / "new")
+    assert len(list((tmp_path / "new/scope/setups").iterdir())) == 2
 
 
 def test_a_folder_that_a_program_has_open_is_left_as_it_was(

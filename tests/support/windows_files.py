@@ -62,3 +62,17 @@ def keep_rules(monkeypatch: pytest.MonkeyPatch) -> None:
         fsync(descriptor)
 
     monkeypatch.setattr(os, "fsync", flush)
+
+
+def ignore_case(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a new file be refused from now on where there is one whose name differs in case only."""
+    real = Path.open
+
+    def opened(path: Path, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+        if "x" in mode and any(
+            one.name.casefold() == path.name.casefold() for one in path.parent.iterdir()
+        ):
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+        return real(path, mode, *arguments, **options)
+
+    monkeypatch.setattr(Path, "open", opened)

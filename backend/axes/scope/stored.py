@@ -13,7 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from backend.foundation.store.files import StorageFailed, checked_name, new_name, write_atomically
+from backend.foundation.store.files import (
+    StorageFailed,
+    checked_name,
+    is_taken,
+    new_name,
+    require_own_name,
+    write_atomically,
+)
 from backend.foundation.store.free_space import RESERVE_BYTES, free_bytes
 from drivers.errors import NotAllowed
 from drivers.texts import limits
@@ -105,10 +112,12 @@ class ScopeStore:
         """Store a set-up under a name, in place of an earlier one.
 
         Raises:
-            NotAllowed: not a file name, or too many set-ups.
+            NotAllowed: not a file name, the name of another set-up but for its case, or too many
+                set-ups.
             StorageFailed: the disk is nearly full or cannot be written.
         """
         path = self.folder / "setups" / new_name(name, SETUP_SUFFIX)
+        require_own_name(path.parent, path.name)
         _check_room(path, SETUP_SUFFIX, MOST_SETUPS)
         write_atomically(path, json.dumps(content, ensure_ascii=False, indent=1).encode())
 
@@ -150,7 +159,7 @@ class ScopeStore:
         folder = self.folder / "snapshots"
         stem = new_name(name, SNAPSHOT_SUFFIX).removesuffix(SNAPSHOT_SUFFIX)
         path, number = folder / (stem + SNAPSHOT_SUFFIX), 2
-        while path.exists():
+        while is_taken(folder, path.name):
             path, number = folder / f"{stem} {number}{SNAPSHOT_SUFFIX}", number + 1
         _check_room(path, SNAPSHOT_SUFFIX, MOST_SNAPSHOTS)
         write_atomically(path, data)

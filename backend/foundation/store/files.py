@@ -6,6 +6,7 @@ import errno
 import os
 import re
 import tempfile
+import unicodedata
 from pathlib import Path
 
 from drivers.errors import NotAllowed
@@ -48,6 +49,40 @@ def new_name(name: str, suffix: str) -> str:
     if _DEVICE.fullmatch(checked.partition(".")[0].rstrip()):
         raise NotAllowed("store.device-name", value=name)
     return checked
+
+
+def same_but_for_case(folder: Path, name: str) -> str | None:
+    """Other file of a folder that Windows and macOS take for ``name``; None where there is none.
+
+    Their file systems ignore case, that of macOS also how a letter with an accent is composed. On
+    Linux both can exist, and only one of them could be carried to such a system.
+    """
+    wanted = _without_case(name)
+    try:
+        present = os.listdir(folder)
+    except OSError:
+        return None
+    return next((one for one in present if one != name and _without_case(one) == wanted), None)
+
+
+def require_own_name(folder: Path, name: str) -> None:
+    """Check that a new file is not, on another system, one that the folder has already.
+
+    Raises:
+        NotAllowed: the folder has a file whose name differs in case only.
+    """
+    other = same_but_for_case(folder, name)
+    if other is not None:
+        raise NotAllowed("store.same-but-for-case", value=name, other=other)
+
+
+def is_taken(folder: Path, name: str) -> bool:
+    """Whether a folder has a file of this name on any system."""
+    return (folder / name).exists() or same_but_for_case(folder, name) is not None
+
+
+def _without_case(name: str) -> str:
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFD", name).casefold())
 
 
 def files_of(folder: Path, *suffixes: str) -> list[Path]:

@@ -8,7 +8,12 @@ from typing import Protocol
 
 from backend.axes.parameters import set_file as parameter_set
 from backend.axes.parameters.set_file import SUFFIX, ParameterSet
-from backend.foundation.store.files import checked_name, new_name, write_atomically
+from backend.foundation.store.files import (
+    checked_name,
+    new_name,
+    require_own_name,
+    write_atomically,
+)
 from drivers.errors import NotAllowed
 
 
@@ -67,11 +72,13 @@ class SetLibrary:
 
         Raises:
             BadSet: the contents are not a parameter set; nothing is written.
-            NotAllowed: the name exists and ``overwrite`` is False. StorageFailed: disk.
+            NotAllowed: the name exists and ``overwrite`` is False, or it differs in case only from
+                one that exists. StorageFailed: disk.
         """
         del tags
         path = self.folder / new_name(name, SUFFIX)
         parameter_set.parse(data, path.name)
+        require_own_name(self.folder, path.name)
         if path.exists() and not overwrite:
             raise NotAllowed("library.exists-already", value=path.name)
         write_atomically(path, data)

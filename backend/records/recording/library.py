@@ -13,6 +13,7 @@ from typing import Any
 from backend.foundation.store.files import (
     checked_name,
     files_of,
+    is_taken,
     new_name,
     shown_name,
     write_atomically,
@@ -101,7 +102,7 @@ class RecordingLibrary:
         """File name from ``wanted``, with a number appended where it exists already."""
         stem = new_name(wanted, SUFFIX).removesuffix(SUFFIX)
         name, number = stem, 2
-        while (self.folder / (name + SUFFIX)).exists():
+        while is_taken(self.folder, name + SUFFIX):
             name, number = f"{stem} {number}", number + 1
         return name + SUFFIX
 

@@ -22,7 +22,7 @@ from typing import IO, BinaryIO
 
 import backend
 from backend.foundation.store.database import FILE, Store
-from backend.foundation.store.files import StorageFailed
+from backend.foundation.store.files import StorageFailed, same_but_for_case
 from backend.records.audit.trail import Trail
 from backend.records.library.backup.copy import copy_rows
 from drivers.errors import NotAllowed
@@ -247,7 +247,7 @@ def unpack(archive: zipfile.ZipFile, parts: dict[str, Part], folder: Path, shown
     """Unpack and compare every part; not more bytes than the manifest states.
 
     Raises:
-        BackupFailed: a part is damaged.
+        BackupFailed: a part is damaged, or the disk takes two of them for one file.
         OSError: an error of the disk.
     """
     for name, part in parts.items():
@@ -260,6 +260,9 @@ def unpack(archive: zipfile.ZipFile, parts: dict[str, Part], folder: Path, shown
                 same = _copy_checked(source, target, part)
         except (zipfile.BadZipFile, EOFError, NotImplementedError) as error:
             raise _bad(shown, text("store.backup-damaged", part=name, cause=str(error))) from error
+        except FileExistsError as error:
+            other = same_but_for_case(path.parent, path.name) or path.name
+            raise _bad(shown, text("store.backup-same-name", part=name, other=other)) from error
         if not same:
             raise _bad(shown, text("store.backup-part-differs", part=name))
 

@@ -7,8 +7,15 @@ from types import SimpleNamespace
 
 import pytest
 
+from backend.axes.scope.stored import ScopeStore
 from backend.commands.base.state import state_folder
-from backend.foundation.store.files import StorageFailed, checked_name, new_name, write_atomically
+from backend.foundation.store.files import (
+    StorageFailed,
+    checked_name,
+    new_name,
+    same_but_for_case,
+    write_atomically,
+)
 from backend.records.library.folder import SetLibrary
 from backend.records.recording.library import RecordingLibrary
 from backend.station.drives.drive_list import DriveList
@@ -83,3 +90,29 @@ def test_a_state_folder_too_deep_for_windows_is_refused_before_it_is_used(
     assert not deep.exists()
     near = Path("/tmp/servodeck")
     assert state_folder(near) == near
+
+
+def test_two_files_that_windows_takes_for_one_cannot_come_about(tmp_path: Path) -> None:
+    """Linux has both; on a laptop one would replace the other, or be shown under its name."""
+    library = RecordingLibrary(tmp_path)
+    (tmp_path / "Größe x.sdrec").touch()
+    assert library.free_name("GRÖSSE X") == "GRÖSSE X 2.sdrec"
+    (tmp_path / "grösse x 2.sdrec").touch()
+    assert library.free_name("GRÖSSE X") == "GRÖSSE X 3.sdrec"
+
+    scope = ScopeStore(tmp_path)
+    scope.save_setup("Current loop", {"kept": 1})
+    with pytest.raises(NotAllowed, match="Windows and macOS take both for one file") as caught:
+        scope.save_setup("current LOOP", {"kept": 2})
+    assert "Current loop" in caught.value.message
+    assert caught.value.remedy
+    scope.save_setup("Current loop", {"kept": 3})
+    assert [(one.name, one.content) for one in scope.setups()] == [("Current loop", {"kept": 3})]
+
+
+def test_an_accent_that_macos_composes_otherwise_is_the_same_name(tmp_path: Path) -> None:
+    (tmp_path / "u\u0308ber.sdset").touch()
+    assert same_but_for_case(tmp_path, "\u00dcber.sdset") == "u\u0308ber.sdset"
+    assert same_but_for_case(tmp_path, "uber.sdset") is None
+    assert same_but_for_case(tmp_path, "u\u0308ber.sdset") is None, "the file itself"
+    assert same_but_for_case(tmp_path / "nowhere", "x") is None
