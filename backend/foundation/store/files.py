@@ -59,7 +59,7 @@ def same_but_for_case(folder: Path, name: str) -> str | None:
     """
     wanted = _without_case(name)
     try:
-        present = os.listdir(folder)
+        present = [path.name for path in folder.iterdir()]
     except OSError:
         return None
     return next((one for one in present if one != name and _without_case(one) == wanted), None)
