@@ -51,6 +51,9 @@ def test_write_is_read_back_and_reported_to_everybody(station: Station, x: str) 
             reported = page.wait("values", drive=x)
             seen += [v["raw"] for v in reported["values"] if v["key"] == "6081:00"]
     assert station.ok(station.http.get(f"/drives/{x}/parameters/6081:00"))["raw"] == 123456
+    # As its digits, from a client that has no exact numbers of 64 bits.
+    again = station.http.put(f"/drives/{x}/parameters/6081:00", json={"raw": "123457"})
+    assert station.ok(again)["raw"] == 123457
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Awaitable, Callable, Iterable
 
 from fastapi import APIRouter
@@ -52,6 +53,7 @@ from drivers.texts.message import Text, profile_text, text
 from drivers.texts.states import state_text
 from profiles.schema import Parameter, Raw
 
+_DIGITS = re.compile(r"-?[0-9]{1,20}")
 router = APIRouter(prefix="/drives/{drive_id}")
 
 
@@ -212,7 +214,9 @@ async def _write(
         raise OutOfRange("api-drive.give-either-raw-value", drive=drive.name, parameter=key)
     parameter = drive.parameter(key)
     old = drive.readings.get(parameter.key)
-    value, raw = (request.value, False) if request.raw is None else (request.raw, True)
+    value, raw = request.value, request.raw is not None
+    if request.raw is not None:
+        value = _exact(parameter, request.raw)
     matters = drive.matters_to_motion(parameter.key) or held_still(parameter)
     # Objects that energise are refused in any case (by `write`), the others while something moves.
     still = matters and motion_of(parameter) != "energises"
@@ -271,6 +275,12 @@ async def write_motion_setting(
     return convert.reading(drive, reading.key)
 
 
+def _exact(parameter: Parameter, raw: Raw) -> Raw:
+    """A whole number that was given as its digits: a page has no exact number beyond 2^53."""
+    digits = isinstance(raw, str) and parameter.is_integer and _DIGITS.fullmatch(raw)
+    return int(raw) if digits else raw
+
+
 def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
     """Raw value of a request, which contains either a raw or a converted value."""
     if (request.raw is None) == (request.value is None):
@@ -278,7 +288,7 @@ def _raw_of(drive: Drive, parameter: Parameter, request: ParameterWrite) -> Raw:
             "api-drive.give-either-raw-value", drive=drive.name, parameter=parameter.key
         )
     if request.raw is not None:
-        return request.raw
+        return _exact(parameter, request.raw)
     value = 0 if request.value is None else request.value
     try:
         return value if isinstance(value, str) else parameter.to_raw(value)

@@ -1,4 +1,5 @@
 import createClient from 'openapi-fetch'
+import { exactJson } from './exact'
 import { counted } from './outstanding'
 import { withTimeLimit } from './time-limit'
 import type { components, paths } from './schema'
@@ -43,8 +44,11 @@ api.use({
     if (csrf !== null) request.headers.set('X-Servodeck-CSRF', csrf)
     return request
   },
-  onResponse({ response, request }) {
+  async onResponse({ response, request }) {
     if (response.status === 401 && !/\/(session|setup|guests)$/.test(request.url)) onUnknown()
+    const json = response.headers.get('Content-Type')?.includes('json')
+    if (!json || response.status === 204) return undefined
+    return new Response(exactJson(await response.text()), response)
   },
 })
 

@@ -1,3 +1,4 @@
+import { exactJson } from '../api/exact'
 import type { FromPage, ToPage } from '../api/schema'
 
 /** What the rest needs of a WebSocket; tests bring their own. */
@@ -73,7 +74,7 @@ export class LiveSocket {
     socket.onmessage = (event) => {
       this.lastHeard = this.now()
       if (event.data instanceof ArrayBuffer) this.events.block(event.data)
-      else this.receive(JSON.parse(String(event.data)) as ToPage)
+      else this.receive(JSON.parse(exactJson(String(event.data))) as ToPage)
     }
     socket.onclose = () => this.lost(socket)
   }

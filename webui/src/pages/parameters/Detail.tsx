@@ -4,7 +4,7 @@ import { api, ask } from '../../api/client'
 import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setReadings, useReading } from '../../live/store'
-import { dateTime, hexadecimal, isInteger, toValue } from '../../widgets/numbers/format'
+import { dateTime, hexadecimal, isWhole, toValue } from '../../widgets/numbers/format'
 import { Icon } from '../../widgets/Icon'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import {
@@ -72,7 +72,7 @@ export function Detail({
       </p>
       <p className="now">
         <span className="num">{readingText(row, reading, false)}</span> {row.unit}
-        {typeof reading.raw === 'number' && isInteger(row.type) && (
+        {isWhole(reading.raw, row.type) && (
           <span className="dim mono">
             {' '}
             {t('parameters.rawValue', { raw: reading.raw })} {hexadecimal(reading.raw, row.type)}

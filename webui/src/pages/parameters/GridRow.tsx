@@ -2,7 +2,7 @@ import { memo, useEffect, useRef, useState } from 'react'
 import type { ParameterRow, ParameterValue, Problem } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { useReading } from '../../live/store'
-import { hexadecimal, isInteger, shown, toValue } from '../../widgets/numbers/format'
+import { hexadecimal, isText, isWhole, shown, toValue } from '../../widgets/numbers/format'
 import { Icon } from '../../widgets/Icon'
 import { parseTyped } from '../../widgets/numbers/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
@@ -111,8 +111,9 @@ export function range(row: ParameterRow, asRaw: boolean): string {
 
 /** What the drive said, never what was typed. */
 export function readingText(row: ParameterRow, reading: ParameterValue, asRaw: boolean): string {
-  if (!asRaw || typeof reading.raw !== 'number') return shown(row, reading.value, reading.raw)
-  return isInteger(row.type)
+  if (!asRaw || reading.raw === null || isText(row.type))
+    return shown(row, reading.value, reading.raw)
+  return isWhole(reading.raw, row.type)
     ? `${reading.raw} · ${hexadecimal(reading.raw, row.type)}`
     : String(reading.raw)
 }

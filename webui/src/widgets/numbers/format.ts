@@ -55,12 +55,16 @@ const BITS: Record<string, number> = {
 }
 
 export const isInteger = (type: string) => type in BITS
+/** Whether a raw value is a whole number, also one of 64 bits as its digits. */
+export const isWhole = (raw: Raw | null, type: string): raw is Raw =>
+  isInteger(type) && (typeof raw === 'number' || (raw !== null && /^-?\d+$/.test(raw)))
 export const isText = (type: string) => type === 'STRING' || type === 'OCTETS'
 
 /** A raw integer in hexadecimal, two's complement in the width of its type. */
-export function hexadecimal(raw: number, type: string): string {
+export function hexadecimal(raw: Raw, type: string): string {
   const width = BITS[type] ?? 32
-  return `0x${BigInt.asUintN(width, BigInt(Math.trunc(raw)))
+  const whole = BigInt(typeof raw === 'number' ? Math.trunc(raw) : raw)
+  return `0x${BigInt.asUintN(width, whole)
     .toString(16)
     .toUpperCase()
     .padStart(Math.ceil(width / 4), '0')}`
@@ -69,7 +73,8 @@ export function hexadecimal(raw: number, type: string): string {
 /** Text of a value as it came from the drive, without unit. */
 export function shown(info: ParameterInfo, value: Raw | null, raw: Raw | null): string {
   if (value === null) return '—'
-  if (typeof value === 'string') return value
+  // A whole number of 64 bits is a text of its digits where a number does not hold it exactly.
+  if (typeof value === 'string') return isInteger(info.type) ? minus(value) : value
   if (typeof raw === 'number' && Number.isInteger(raw)) {
     const label = info.enum[String(raw)]
     if (label !== undefined) return `${raw} · ${label}`
@@ -79,8 +84,9 @@ export function shown(info: ParameterInfo, value: Raw | null, raw: Raw | null): 
 
 /** Engineering value of a raw one (profiles/schema.py: raw × scale + offset). */
 export function toValue(info: ParameterInfo, raw: Raw): Raw {
-  if (typeof raw === 'string' || (info.scale === 1 && info.offset === 0)) return raw
-  return Number((raw * info.scale + info.offset).toPrecision(12))
+  if (isText(info.type) || (info.scale === 1 && info.offset === 0)) return raw
+  const number = Number(raw)
+  return Number.isNaN(number) ? raw : Number((number * info.scale + info.offset).toPrecision(12))
 }
 
 const two = (n: number) => String(n).padStart(2, '0')

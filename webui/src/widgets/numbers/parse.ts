@@ -17,6 +17,8 @@ export function parseTyped(info: ParameterInfo, text: string, asRaw: boolean): T
   if (trimmed === '' || (!hex && !/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(trimmed))) {
     return { ok: false, why: 'number' }
   }
+  const exact = wholeText(info, trimmed, asRaw)
+  if (exact !== null) return exact
   const number = Number(trimmed)
   if (!Number.isFinite(number)) return { ok: false, why: 'long' }
   const raw = hex || asRaw || Object.keys(info.enum).length > 0
@@ -33,6 +35,24 @@ export function parseTyped(info: ParameterInfo, text: string, asRaw: boolean): T
     return { ok: true, raw: checked }
   }
   return raw || whole ? { ok: true, raw: checked } : { ok: true, value: number }
+}
+
+/**
+ * A whole number that a number of this language does not hold exactly, as its digits; null for all
+ * others. In a unit with a scale it stays what it was: the drive rounds it anyway.
+ */
+function wholeText(info: ParameterInfo, text: string, asRaw: boolean): Typed | null {
+  const whole = /^[+-]?\d+$/.test(text) || /^0x[0-9a-f]+$/i.test(text)
+  const plain = asRaw || /^0x/i.test(text) || (info.scale === 1 && info.offset === 0)
+  if (!whole || !plain || (info.type !== 'INT64' && info.type !== 'UINT64')) return null
+  const exact = BigInt(text.replace('+', ''))
+  if (Number.isSafeInteger(Number(exact))) return null
+  const fits = info.type === 'INT64' ? BigInt.asIntN(64, exact) : BigInt.asUintN(64, exact)
+  if (fits !== exact) return { ok: false, why: 'long' }
+  const { min_raw: low, max_raw: high } = info
+  if (low !== null && exact < low) return { ok: false, why: 'low', limit: inUnit(info, low) }
+  if (high !== null && exact > high) return { ok: false, why: 'high', limit: inUnit(info, high) }
+  return { ok: true, raw: String(exact) }
 }
 
 function inUnit(info: ParameterInfo, raw: number): string {
