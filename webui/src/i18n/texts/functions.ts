@@ -76,6 +76,10 @@ export const functions = {
     '端子正被强制。结束、离开页面、断开连接或按“停止”时会恢复。',
   ],
   'io.force.other': ['Somebody is forcing terminals of this axis.', '有人正在强制此轴的端子。'],
+  'io.force.notEnded': [
+    'The end was not confirmed: terminals may still be forced. The server restores them 5 s after it last heard this page. Check the terminals at the machine, and end it again.',
+    '结束未得到确认：端子可能仍被强制。服务器在最后一次收到本页面信号 5 秒后会恢复它们。请在机器上检查端子，并再次结束。',
+  ],
   'io.force.value': ['Value of {name}', '{name} 的值'],
   'probe.title': ['Touch probes', '探针'],
   'probe.number': ['Probe {number}', '探针 {number}'],

@@ -1,5 +1,5 @@
 import { Button, Checkbox, SegmentedControl } from '@mantine/core'
-import { useEffect, useState } from 'react'
+import { useEffect, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { ForcingInfo, MessageInfo } from '../../api/schema'
 import { plainResult } from '../../api/results'
@@ -32,15 +32,15 @@ export function ForcingPanel({
   const speak = useMessages()
   const [agreed, setAgreed] = useState(false)
   const [mine, setMine] = useState<ForcingInfo | null>(null)
+  // Asked to end, by this page: no further sign of life, whether or not the server confirms it.
+  const [ending, setEnding] = useState<'asked' | 'unconfirmed' | 'confirmed' | null>(null)
   const act = useAction()
   const job = useJob(mine?.job ?? forcing.job ?? null)
   const path = { drive_id: drive, name: forcing.name }
   const plain = plainResult(job?.result) as { reason?: string; reason_message?: MessageInfo | null }
   const over = mine !== null && job !== null && job.state !== 'running'
   useEffect(() => {
-    if (!mine || over) return
-    const end = () =>
-      void api.DELETE('/api/v1/drives/{drive_id}/io/forcing/{name}', { params: { path } })
+    if (!mine || over || ending !== null) return
     const timer = setInterval(() => {
       // A page that nobody looks at must not hold terminals.
       if (document.hidden) return
@@ -51,16 +51,32 @@ export function ForcingPanel({
         }),
       ).catch((error: unknown) => act.setProblem(problemOf(error)))
     }, ALIVE_MS)
-    return () => {
-      clearInterval(timer)
-      end()
+    return () => clearInterval(timer)
+  }, [mine !== null, over, ending !== null, drive, forcing.name])
+  const leave = useRef(() => {})
+  leave.current = () => {
+    // Nobody is there to read what comes of it: without a sign of life the server ends it anyway.
+    if (mine && !over && ending !== 'confirmed') {
+      void api
+        .DELETE('/api/v1/drives/{drive_id}/io/forcing/{name}', { params: { path } })
+        .catch(() => {})
     }
-  }, [mine !== null, over, drive, forcing.name])
+  }
+  useEffect(() => () => leave.current(), [drive, forcing.name])
   useEffect(() => {
     if (over) onChanged()
   }, [over])
+  const end = async () => {
+    setEnding('asked')
+    const done = await act.run(() =>
+      ask(api.DELETE('/api/v1/drives/{drive_id}/io/forcing/{name}', { params: { path } })),
+    )
+    setEnding(done ? 'confirmed' : 'unconfirmed')
+    if (done) onChanged()
+  }
   const begin = () =>
     act.run(async () => {
+      setEnding(null)
       setMine(
         await ask(
           api.POST('/api/v1/drives/{drive_id}/io/forcing/{name}', {
@@ -82,7 +98,8 @@ export function ForcingPanel({
         ),
       ),
     )
-  const holding = mine !== null && !over
+  const holding = mine !== null && !over && ending === null
+  const unconfirmed = mine !== null && !over && (ending === 'asked' || ending === 'unconfirmed')
   return (
     <Panel title={say(forcing.title)}>
       <p className="prose">
@@ -102,7 +119,18 @@ export function ForcingPanel({
           {speak.message(plain.reason_message, plain.reason)}
         </p>
       )}
-      {!holding && forcing.running && !mine ? (
+      {unconfirmed ? (
+        <>
+          {ending === 'unconfirmed' && (
+            <p className="note fault" role="alert">
+              {t('io.force.notEnded')}
+            </p>
+          )}
+          <Button variant="filled" loading={act.busy} onClick={() => void end()}>
+            {t('io.force.end')}
+          </Button>
+        </>
+      ) : !holding && forcing.running && !mine ? (
         <p className="note warn">{t('io.force.other')}</p>
       ) : (
         !holding && (
@@ -144,7 +172,7 @@ export function ForcingPanel({
               )
             })}
           </ul>
-          <Button variant="filled" onClick={() => setMine(null)}>
+          <Button variant="filled" onClick={() => void end()}>
             {t('io.force.end')}
           </Button>
         </>
