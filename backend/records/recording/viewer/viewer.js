@@ -1,4 +1,4 @@
-// Starts rerun's own viewer and feeds it: live from /rerun/feed, or a stored recording's .rrd.
+// Starts rerun's own viewer and feeds it: live from its feed, or a stored recording's .rrd.
 // The page around it hears what happens by messages; this frame shows no words of its own.
 'use strict'
 
@@ -17,7 +17,7 @@ function tell(change) {
 
 /** The viewer's program, with progress; it is 43 MB and is sent compressed. */
 async function program() {
-  const answer = await fetch(`/rerun/${version}/re_viewer_bg.wasm`)
+  const answer = await fetch(`${version}/re_viewer_bg.wasm`)
   if (!answer.ok) throw new Error((await answer.json()).detail)
   const total = Number(answer.headers.get('rerun-final-length')) || 1
   let loaded = 0
@@ -34,7 +34,7 @@ async function program() {
 }
 
 function live(handle) {
-  const socket = new WebSocket(`${location.origin.replace(/^http/, 'ws')}/rerun/feed`)
+  const socket = new WebSocket(new URL('feed', location.href.replace(/^http/, 'ws')))
   socket.binaryType = 'arraybuffer'
   let channel = null
   let received = 0
@@ -78,7 +78,7 @@ function live(handle) {
 }
 
 async function stored(handle, name) {
-  const answer = await fetch(`/api/v1/recordings/${encodeURIComponent(name)}/exports/rrd`)
+  const answer = await fetch(`../api/v1/recordings/${encodeURIComponent(name)}/exports/rrd`)
   if (!answer.ok) throw new Error((await answer.json()).detail)
   const data = new Uint8Array(await answer.arrayBuffer())
   handle.open_channel('stored', name)

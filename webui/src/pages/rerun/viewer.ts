@@ -1,4 +1,5 @@
 import { useEffect, useState } from 'react'
+import { API_ROOT } from '../../api/client'
 
 /** What the viewer's frame shows (backend/records/recording/viewer/viewer.js). */
 export interface ViewerState {
@@ -36,7 +37,7 @@ export function useViewer(): [ViewerState, (state: ViewerState) => void] {
 export function viewerUrl(recording: string | null, theme: string): string {
   const query = new URLSearchParams({ theme })
   if (recording !== null) query.set('recording', recording)
-  return `/rerun/?${query}`
+  return `${API_ROOT}/rerun/?${query}`
 }
 
 /** Bytes as `12.3 MB`. */

@@ -1,5 +1,6 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useRef, useState } from 'react'
+import { API_ROOT } from '../../api/client'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
 import { stopByEscapeIn } from '../../widgets/frame-stop'
@@ -30,7 +31,7 @@ export function SceneFrame({ axis, className = '' }: { axis?: string; className?
         ref={frame}
         className={`viewer ${className}`}
         title={t('scene.frame')}
-        src={`/viser/?${query}`}
+        src={`${API_ROOT}/viser/?${query}`}
         onLoad={() => stopByEscapeIn(frame.current)}
       />
       <SceneStates {...(axis === undefined ? {} : { axis })} />

@@ -1,6 +1,6 @@
 import { Button, Checkbox, FileButton } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../../api/client'
+import { API_ROOT, api, ask } from '../../../api/client'
 import type { EepromPlan, SegmentStation } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
@@ -64,7 +64,8 @@ export function Eeprom({ url, station }: { url: string; station: SegmentStation 
       forget()
       setWritten(true)
     })
-  const address = `/api/v1/ethercat/eeprom?${new URLSearchParams({ url, station: String(station.station) })}`
+  const query = new URLSearchParams({ url, station: String(station.station) })
+  const address = `${API_ROOT}/api/v1/ethercat/eeprom?${query}`
   return (
     <details>
       <summary>{t('segment.eeprom')}</summary>
