@@ -195,6 +195,8 @@ def test_a_set_goes_to_other_tools_and_comes_back(station: Station, x: str) -> N
         exported = station.http.get(f"/sets/{saved['file']}/list", params={"format": kind})
         assert exported.status_code == 200
         assert f'filename="for export.{kind}"' in exported.headers["content-disposition"]
+        missing = station.http.get(f"/sets/{saved['file']}/list/left-out", params={"format": kind})
+        assert station.ok(missing) == []
         stored = station.ok(
             station.http.post(
                 "/sets/list",
@@ -205,6 +207,14 @@ def test_a_set_goes_to_other_tools_and_comes_back(station: Station, x: str) -> N
         assert (stored["parameters"], stored["problems"]) == (saved["count"], [])
         diff = station.ok(station.http.get(f"/drives/{x}/diff", params={"file": stored["file"]}))
         assert not [row["key"] for row in diff["rows"] if row["status"] != "same"]
+    listed = b"key,raw\n6083:00,250\nPA_02,1\n"
+    of_modbus = {"file": "of modbus", "profile": "ds_c"}
+    station.ok(station.http.post("/sets/list", params=of_modbus, content=listed))
+    (missing,) = station.ok(
+        station.http.get("/sets/of modbus.sdset/list/left-out", params={"format": "dcf"})
+    )
+    assert missing["reason_message"]["code"] == "sets.left-out-no-object"
+    assert missing["reason"].startswith("only Modbus reaches it")
     refused = station.http.post(
         "/sets/list", params={"file": "none", "profile": "mms7"}, content=b"hello,world\n"
     )

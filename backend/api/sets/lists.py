@@ -9,12 +9,14 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.context import TheBench
-from backend.api.errors import NotFound, message_of
+from backend.api.errors import NotFound, message_of, words_of
 from backend.api.named_profile import profile_named
-from backend.api.station.models_description import ImportedList
+from backend.api.station.models_description import ImportedList, RowNotExported
+from backend.axes.parameters.csv_list import LeftOut
 from backend.axes.parameters.lists import export_list, import_list
 from backend.axes.parameters.set_file import MAX_BYTES, BadSet
 from backend.foundation.work.apart import read_apart
+from backend.station.bench import Bench
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
 
@@ -24,18 +26,38 @@ router = APIRouter()
 _MEDIA = {"csv": "text/csv; charset=utf-8", "dcf": "application/octet-stream"}
 
 
+_Format = Annotated[Literal["csv", "dcf"], Query(alias="format", description="of the download")]
+
+
 @router.get("/sets/{file}/list", response_class=Response)
-async def export_set(
-    bench: TheBench,
-    file: str,
-    kind: Annotated[
-        Literal["csv", "dcf"], Query(alias="format", description="of the download")
-    ] = "csv",
-) -> Response:
+async def export_set(bench: TheBench, file: str, kind: _Format = "csv") -> Response:
     """Export a stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
 
-    A DCF leaves out parameters without an object (those that only Modbus reaches).
+    A DCF cannot hold all rows; those that are missing are at `/sets/{file}/list/left-out`.
     """
+    name, data, _ = await _exported(bench, file, kind)
+    return Response(
+        data,
+        media_type=_MEDIA[kind],
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+@router.get("/sets/{file}/list/left-out")
+async def rows_not_exported(
+    bench: TheBench, file: str, kind: _Format = "csv"
+) -> list[RowNotExported]:
+    """Rows of a stored parameter set that its export in this format does not have."""
+    _, _, left_out = await _exported(bench, file, kind)
+    return [
+        RowNotExported(key=each.key, reason=words_of(each.why), reason_message=message_of(each.why))
+        for each in left_out
+    ]
+
+
+async def _exported(
+    bench: Bench, file: str, kind: Literal["csv", "dcf"]
+) -> tuple[str, bytes, tuple[LeftOut, ...]]:
     try:
         content = await bench.records.store.call(bench.sets.load, file)
     except BadSet:
@@ -45,11 +67,8 @@ async def export_set(
     profile = profile_named(content.profile)
     stem = file.removesuffix(".sdset").encode("ascii", "replace").decode().replace("?", "_")
     name = f"{stem}.{kind}"
-    return Response(
-        await asyncio.to_thread(export_list, content, profile, name, datetime.now()),
-        media_type=_MEDIA[kind],
-        headers={"Content-Disposition": f'attachment; filename="{name}"'},
-    )
+    data, left_out = await asyncio.to_thread(export_list, content, profile, name, datetime.now())
+    return name, data, left_out
 
 
 @router.post(

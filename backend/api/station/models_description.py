@@ -123,6 +123,14 @@ class ImportedList(Message):
     problem_messages: list[MessageInfo] = Field(description="the same as codes and facts")
 
 
+class RowNotExported(Message):
+    """A row of a parameter set that a list in another format does not have."""
+
+    key: str
+    reason: str
+    reason_message: MessageInfo = Field(description="of text, as code and facts")
+
+
 class ProfileTexts(Message):
     """Texts of a profile in another language."""
 

@@ -65,6 +65,14 @@ class ParameterList:
     problems: tuple[Text, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """A row of a set that a list in another format does not have."""
+
+    key: str
+    why: Text
+
+
 def write_csv(profile: Profile, rows: Iterable[Row]) -> str:
     """A list with heading ``key,name,group,unit,value,raw`` and CRLF line ends (RFC 4180)."""
     out = io.StringIO()

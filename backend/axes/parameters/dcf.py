@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 
 from backend.axes.drive.readings import Reading
-from backend.axes.parameters.csv_list import ParameterList, first
+from backend.axes.parameters.csv_list import LeftOut, ParameterList, first
 from backend.axes.parameters.set_file import BadSet, Row
 from drivers.texts.imports import failure_text, finding_line
 from drivers.texts.message import Text, text
@@ -19,29 +19,53 @@ from profiles.importer import (
     read_dcf_values,
 )
 from profiles.importer.values import default_value
-from profiles.schema import Profile, Raw
+from profiles.schema import INTEGER_RANGE, Parameter, Profile, Raw
+
+#: No finite REAL32 is as large (IEEE 754).
+_REAL32_END = 2**128
 
 
 def write_dcf(
     profile: Profile, rows: Iterable[Row], *, file_name: str, node_name: str, created: datetime
-) -> tuple[str, int]:
-    """The file's text, and the number of rows left out.
-
-    They have no object, or are texts that the format cannot hold.
-    """
+) -> tuple[str, tuple[LeftOut, ...]]:
+    """The file's text, and the rows that the format cannot hold."""
     values: dict[str, Raw] = {}
-    left_out = 0
+    left_out: list[LeftOut] = []
     for row in rows:
-        parameter = profile.by_key.get(row.key)
-        if row.raw is None:
-            continue
-        no_object = parameter is None or parameter.index is None or parameter.type == "OCTETS"
-        if no_object or not holds(row.raw):
-            left_out += 1
-        else:
+        why = _not_held(profile, row, values)
+        if why is not None:
+            left_out.append(LeftOut(row.key, why))
+        elif row.raw is not None:
             values[row.key] = row.raw
-    text = export_dcf(profile, values, created, file_name=file_name, node_name=node_name)
-    return text, left_out
+    content = export_dcf(profile, values, created, file_name=file_name, node_name=node_name)
+    return content, tuple(left_out)
+
+
+def _not_held(profile: Profile, row: Row, earlier: Mapping[str, Raw]) -> Text | None:
+    """Why a row cannot be in a DCF; None where it can."""
+    parameter = profile.by_key.get(row.key)
+    if row.raw is None:
+        return row.problem or text("sets.left-out-no-value")
+    if parameter is None:
+        return text("sets.row-no-parameter", profile_title=profile.title, key=row.key)
+    if row.key in earlier:
+        return text("sets.row-twice")
+    if parameter.index is None:
+        return text("sets.left-out-no-object")
+    if parameter.type == "OCTETS":
+        return text("sets.left-out-octets")
+    if not _of_type(parameter, row.raw):
+        return text("sets.left-out-type", raw=str(row.raw)[:40], type=parameter.type)
+    return None if holds(row.raw) else text("sets.left-out-text")
+
+
+def _of_type(parameter: Parameter, raw: Raw) -> bool:
+    if parameter.type == "STRING" or isinstance(raw, str):
+        return parameter.type == "STRING" and isinstance(raw, str)
+    if parameter.type == "REAL32":
+        return abs(raw) < _REAL32_END
+    low, high = INTEGER_RANGE[parameter.type]
+    return isinstance(raw, int) and low <= raw <= high
 
 
 def read_dcf(data: bytes, profile: Profile, name: str = "the file") -> ParameterList:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from datetime import datetime
 
 from backend.axes.drive.drive import Drive
-from backend.axes.parameters.csv_list import ParameterList, read_csv, write_csv
+from backend.axes.parameters.csv_list import LeftOut, ParameterList, read_csv, write_csv
 from backend.axes.parameters.dcf import read_dcf, write_dcf
 from backend.axes.parameters.set_file import ParameterSet, dump
 from drivers.link import Found
+from drivers.texts.message import text
 from profiles.importer import is_dcf, read_dcf_identity
 from profiles.schema import Profile
 
@@ -40,12 +41,20 @@ def import_list(
     return dump(source, found.readings, author="", notes=notes, saved=saved), found
 
 
-def export_list(content: ParameterSet, profile: Profile, name: str, created: datetime) -> bytes:
-    """A parameter set as DCF where ``name`` ends in .dcf, else as CSV with a byte order mark."""
+def export_list(
+    content: ParameterSet, profile: Profile, name: str, created: datetime
+) -> tuple[bytes, tuple[LeftOut, ...]]:
+    """A parameter set as DCF where ``name`` ends in .dcf, else as CSV with a byte order mark.
+
+    With it the rows that are not in that file, each with its reason.
+    """
     if not name.lower().endswith(".dcf"):
+        bad = [row for row in content.rows if row.raw is None]
+        no_value = text("sets.left-out-no-value")
+        left_out = [LeftOut(row.key, row.problem or no_value) for row in bad]
         # Without the mark, spreadsheets read a file in their own code page.
-        return write_csv(profile, content.rows).encode("utf-8-sig")
-    text, _ = write_dcf(
+        return write_csv(profile, content.rows).encode("utf-8-sig"), tuple(left_out)
+    written, missing = write_dcf(
         profile, content.rows, file_name=name, node_name=content.drive_name, created=created
     )
-    return text.encode("utf-8")
+    return written.encode("utf-8"), missing

@@ -12,7 +12,7 @@ import typer
 from backend.axes.parameters.lists import export_list, import_list
 from backend.axes.parameters.set_file import SUFFIX, parse
 from backend.commands.base.options import Json, Place, Profile, Server, Station, Url, place
-from backend.commands.base.printing import print_text
+from backend.commands.base.printing import note, print_text
 from backend.commands.base.session import run
 from backend.commands.drive import local_params, remote_params
 from backend.commands.drive.values import bytes_of
@@ -193,9 +193,15 @@ def export(
         if out.suffix.lower() not in (".csv", ".dcf"):
             raise NotAllowed("command.neither-csv-nor-dcf", out=out.name)
         content = parse(bytes_of(file), file.name)
-        data = export_list(content, load_profile(content.profile), out.name, datetime.now())
+        profile_of = load_profile(content.profile)
+        data, left_out = export_list(content, profile_of, out.name, datetime.now())
         write_atomically(out, data)
-        print_text("printed.parameters-in-file", file=str(out), count=len(content.rows))
+        for each in left_out:
+            note("printed.left-out", place="", key=each.key, reason=each.why)
+        count = len(content.rows) - len(left_out)
+        print_text("printed.parameters-in-file", file=str(out), count=count)
+        if left_out:
+            note("printed.rows-not-in-list", file=str(out), count=len(left_out))
 
     run(work)
 

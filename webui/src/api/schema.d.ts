@@ -3490,9 +3490,29 @@ export interface paths {
          * Export Set
          * @description Export a stored parameter set as CSV for spreadsheets, or as DCF for CANopen tools.
          *
-         *     A DCF leaves out parameters without an object (those that only Modbus reaches).
+         *     A DCF cannot hold all rows; those that are missing are at `/sets/{file}/list/left-out`.
          */
         get: operations["export_set"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/v1/sets/{file}/list/left-out": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Rows Not Exported
+         * @description Rows of a stored parameter set that its export in this format does not have.
+         */
+        get: operations["rows_not_exported"];
         put?: never;
         post?: never;
         delete?: never;
@@ -11138,6 +11158,18 @@ export interface components {
          */
         Role: "viewer" | "operator" | "administrator" | "guest";
         /**
+         * RowNotExported
+         * @description A row of a parameter set that a list in another format does not have.
+         */
+        RowNotExported: {
+            /** Key */
+            key: string;
+            /** Reason */
+            reason: string;
+            /** @description of text, as code and facts */
+            reason_message: components["schemas"]["MessageInfo"];
+        };
+        /**
          * SafetyResult
          * @description Times are in ms from the first sign on the bus, distances in revolutions of the motor.
          *
@@ -14301,6 +14333,7 @@ export type ResonanceInfo = components['schemas']['ResonanceInfo'];
 export type RetentionBounds = components['schemas']['RetentionBounds'];
 export type Right = components['schemas']['Right'];
 export type Role = components['schemas']['Role'];
+export type RowNotExported = components['schemas']['RowNotExported'];
 export type SafetyResult = components['schemas']['SafetyResult'];
 export type SafetySettings = components['schemas']['SafetySettings'];
 export type SaveSetRequest = components['schemas']['SaveSetRequest'];
@@ -43819,6 +43852,148 @@ export interface operations {
                 };
             };
             /** @description Link lost */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No answer in time */
+            504: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    rows_not_exported: {
+        parameters: {
+            query?: {
+                /** @description of the download */
+                format?: "csv" | "dcf";
+            };
+            header?: never;
+            path: {
+                file: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RowNotExported"][];
+                };
+            };
+            /** @description Not a request of this interface */
+            400: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Nobody is logged in */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not for this person, or not from our page */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description No such thing */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not with this method */
+            405: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The body came too slowly */
+            408: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not possible now */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Not acceptable */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description Too often */
+            429: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The answer makes no sense */
+            502: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description The link is gone */
             503: {
                 headers: {
                     [name: string]: unknown;

@@ -141,6 +141,10 @@ printed_row-not-in-file = not in file
 printed_row-read-only = read only
 printed_row-same = same
 printed_rows-in-database = { $rows } rows of library and audit are in the database
+printed_rows-not-in-list = { $file } lacks { $count ->
+        [one] { $count } row
+       *[other] { $count } rows
+    } of the set: keep the set itself as the copy of all values, and set these in the drive by servodeck
 printed_same-function = SAME AS { $terminals }
 printed_samples = { $file }: { $samples } samples, { $lost } lost on the way
 printed_saved-in-drive = { $drive }: saved in the drive's memory

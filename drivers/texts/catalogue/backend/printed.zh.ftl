@@ -138,6 +138,7 @@ printed_row-not-in-file = 文件中没有
 printed_row-read-only = 只读
 printed_row-same = 相同
 printed_rows-in-database = 资料库和审计的 { $rows } 行已存入数据库
+printed_rows-not-in-list = { $file } 缺少参数集中的 { $count } 项：请保留参数集本身作为全部值的副本，并用 servodeck 在驱动器中设置这些值
 printed_same-function = 与 { $terminals } 功能相同
 printed_samples = { $file }：{ $samples } 个采样，途中丢失 { $lost } 个
 printed_saved-in-drive = { $drive }：已保存到驱动器存储器

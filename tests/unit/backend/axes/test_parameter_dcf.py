@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from backend.axes.parameters.csv_list import LeftOut
 from backend.axes.parameters.dcf import read_dcf, write_dcf
 from backend.axes.parameters.lists import import_list
 from backend.axes.parameters.set_file import BadSet, Row, parse
@@ -54,13 +55,13 @@ ParameterValue=1\r
 """
 
 
-def dcf(rows: list[Row]) -> tuple[str, int]:
+def dcf(rows: list[Row]) -> tuple[str, tuple[LeftOut, ...]]:
     return write_dcf(DS_C, rows, file_name="x.dcf", node_name="Z axis", created=WHEN)
 
 
 def test_another_library_reads_the_values() -> None:
     text, left_out = dcf(ROWS)
-    assert left_out == 0
+    assert left_out == ()
     file = io.StringIO(text)
     file.name = "x.dcf"
     objects = canopen.import_od(file)
@@ -113,10 +114,47 @@ def test_the_set_of_a_dcf_says_for_which_drive_it_is() -> None:
         assert (content.vendor_id, content.product_code, content.serial) == identity
 
 
-def test_parameters_without_an_object_are_counted() -> None:
+def test_each_row_that_the_format_cannot_hold_is_named_with_its_reason() -> None:
     only_modbus = next(p.key for p in DS_C.parameters if p.index is None and p.access == "rw")
-    _, left_out = dcf([*ROWS, Row(only_modbus, 1)])
-    assert left_out == 1
+    text, left_out = dcf(
+        [
+            *ROWS,
+            Row(only_modbus, 1),
+            Row("6083:00", 7),
+            Row("5FFF:00", 1),
+            Row("6084:00", None),
+            Row("607A:00", "many"),
+            Row("60FF:00", 2**40),
+        ]
+    )
+    assert [(each.key, each.why.code) for each in left_out] == [
+        (only_modbus, "sets.left-out-no-object"),
+        ("6083:00", "sets.row-twice"),
+        ("5FFF:00", "sets.row-no-parameter"),
+        ("6084:00", "sets.left-out-no-value"),
+        ("607A:00", "sets.left-out-type"),
+        ("60FF:00", "sets.left-out-type"),
+    ]
+    values = {r.key: r.raw for r in read_dcf(text.encode(), DS_C).readings}
+    assert values == {"6083:00": 250, "607C:00": -1200}
+
+
+def test_the_command_line_says_which_rows_are_missing_in_the_dcf(tmp_path: Path) -> None:
+    only_modbus = next(p for p in DS_C.parameters if p.index is None and p.access == "rw")
+    listed = f"key,raw\n6083:00,250\n{only_modbus.key},{only_modbus.min_raw or 0}\n"
+    data, _ = import_list(listed.encode(), DS_C, "a.csv", WHEN)
+    (tmp_path / "a.sdset").write_bytes(data)
+
+    def export(name: str) -> str:
+        done = CliRunner().invoke(app, ["export", f"{tmp_path}/a.sdset", f"{tmp_path}/{name}"])
+        assert done.exit_code == 0, done.output
+        return done.output
+
+    said = export("b.dcf")
+    assert f"left out: {only_modbus.key}: only Modbus reaches it" in said
+    assert "b.dcf: 1 parameters" in said
+    assert "b.dcf lacks 1 row of the set: keep the set itself" in said
+    assert "left out" not in export("b.csv")
 
 
 @pytest.mark.parametrize(
@@ -180,8 +218,8 @@ def test_a_text_is_written_as_it_is_or_not_at_all() -> None:
         )
         with suppress(BadSet):
             read = read_dcf(text.encode(), family)
-            return {r.key: r.raw for r in read.readings}, left_out
-        return {}, left_out
+            return {r.key: r.raw for r in read.readings}, len(left_out)
+        return {}, len(left_out)
 
     for value in ("A  B", "A;B // C", "x" * 300):
         assert written(value) == ({"6083:00": value}, 0)

@@ -224,6 +224,10 @@ export const bench = {
   'sets.overwrite': ['If the name exists, save as a new version', '若同名则保存为新版本'],
   'sets.upload': ['Upload a file', '上传文件'],
   'sets.exportAs': ['{name} as {format}', '将 {name} 导出为 {format}'],
+  'sets.notInList': [
+    '{count} {count|row is|rows are} not in the {format} file. Keep the set itself as the copy of all values, and set these values in the drive on this page:',
+    '{format} 文件中缺少 {count} 项。请保留参数集本身作为全部值的副本，并在本页面中设置这些值：',
+  ],
   'sets.listRead': [
     '{count} {count|parameter|parameters} of the list {count|was|were} stored as a set. Nothing was written to a drive.',
     '列表中的 {count} 个参数已存为参数集，未写入驱动器。',

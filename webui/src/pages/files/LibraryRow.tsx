@@ -11,7 +11,7 @@ import { useAction } from '../../widgets/useAction'
 import { size } from '../rerun/viewer'
 import { DeleteEntry } from './DeleteEntry'
 import { EntryDetails } from './EntryDetails'
-import { listUrl } from './sets'
+import { useListDownload } from './ListDownload'
 
 export function contentUrl(entry: LibraryEntry, version?: number): string {
   const query = version === undefined ? '' : `?version=${version}`
@@ -59,6 +59,7 @@ export function LibraryRow({
 }) {
   const t = useT()
   const act = useAction()
+  const lists = useListDownload(entry.name)
   const [deleting, setDeleting] = useState(false)
   const problem = entry.latest.facts.problem
   const { name } = entry
@@ -171,18 +172,7 @@ export function LibraryRow({
                   <Icon name="download" />
                 </ActionIcon>
               )}
-              {entry.kind === 'set' &&
-                (['csv', 'dcf'] as const).map((format) => (
-                  <Button
-                    key={format}
-                    component="a"
-                    href={listUrl(name, format)}
-                    download
-                    aria-label={t('sets.exportAs', { name, format: format.toUpperCase() })}
-                  >
-                    {format.toUpperCase()}
-                  </Button>
-                ))}
+              {entry.kind === 'set' && lists.buttons}
               {entry.here && (
                 <ActionIcon
                   aria-label={t(entry.station ? 'library.delete' : 'library.putAside', { name })}
@@ -196,6 +186,7 @@ export function LibraryRow({
         </div>
       </div>
       <ProblemNote problem={act.problem} onClose={act.clear} />
+      {entry.kind === 'set' && lists.note}
       {entry.deleted === null && (
         <EntryDetails
           entry={entry}
