@@ -38,6 +38,10 @@ export const scope = {
   'trigger.high': ['To', '上限'],
   'trigger.bit': ['Bit', '位'],
   'trigger.persistence': ['Persistence', '余辉'],
+  'trigger.gone': [
+    'There is no axis {axis}: the trigger is off. Choose another axis.',
+    '没有轴 {axis}：触发已关闭。请选择其他轴。',
+  ],
   'trigger.none': ['newest only', '仅最新'],
   'trigger.sweeps': ['{count} earlier', '之前 {count} 次'],
   'trigger.arm': ['Arm', '启动触发'],

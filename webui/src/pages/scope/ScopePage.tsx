@@ -27,6 +27,7 @@ import {
   rangesOf,
   type Shown,
   triggerOf,
+  withoutGoneAxis,
   withChannels,
   withRange,
 } from './setup'
@@ -80,12 +81,13 @@ export function ScopePage() {
   const last = useRef<ScopeFrame | null>(null)
   const tableAt = useRef(0)
   const tabs = useRef<HTMLDivElement>(null)
-  const trigger = triggerOf(setup, infos)
+  const sought = withoutGoneAxis(setup, useDrives())
+  const trigger = triggerOf(sought, infos)
   const ranges = rangesOf(setup)
   const rescale = (unit: string, span: Span | null) => change((now) => withRange(now, unit, span))
   const fit = () => change({ ...setup, ranges: [] })
-  useSampling(setup, infos)
-  useTrigger(setup, infos, arming)
+  useSampling(sought, infos)
+  useTrigger(sought, infos, arming)
 
   const view = (): ScopeView | null =>
     shown.length === 0

@@ -48,6 +48,8 @@ export function TriggerPanel({
   const on = choice.mode !== 'off'
   const { kind } = choice
   const trace = shown.find((each) => each.id === choice.trace) ?? shown[0]
+  // An axis that was removed, or of another machine's set-up: no other one takes its place.
+  const gone = needsDrive(kind) && !drives.some((each) => each.id === choice.drive)
   const unit = kind === 'motion' ? 'rpm' : (trace?.unit ?? '')
   const chooseKind = (next: Choice['kind']) => {
     const drive = choice.drive || (drives[0]?.id ?? '')
@@ -76,8 +78,12 @@ export function TriggerPanel({
             <NativeSelect
               label={t('frame.axis')}
               value={choice.drive}
+              error={gone && t('trigger.gone', { axis: choice.drive })}
               onChange={(event) => onChange({ ...choice, drive: event.currentTarget.value })}
-              data={drives.map((each) => ({ value: each.id, label: each.name }))}
+              data={[
+                ...(gone ? [{ value: choice.drive, label: choice.drive || '—' }] : []),
+                ...drives.map((each) => ({ value: each.id, label: each.name })),
+              ]}
             />
           ) : (
             <NativeSelect
@@ -132,8 +138,10 @@ export function TriggerPanel({
               label: sweeps ? t('trigger.sweeps', { count: sweeps }) : t('trigger.none'),
             }))}
           />
-          <Button onClick={onArm}>{t('trigger.arm')}</Button>
-          {state && (
+          <Button disabled={gone} onClick={onArm}>
+            {t('trigger.arm')}
+          </Button>
+          {state && !gone && (
             <strong className={`trigger-state ${state.state}`} role="status">
               {t(`trigger.state.${state.state}`, { count: state.count })}
             </strong>

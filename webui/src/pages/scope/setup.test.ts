@@ -1,6 +1,14 @@
 import { describe, expect, it } from 'vitest'
 import type { ScopeChannelInfo, ScopeSetup } from '../../api/schema'
-import { configOf, EMPTY, type Infos, scaleOf, triggerOf, withChannels } from './setup'
+import {
+  configOf,
+  EMPTY,
+  type Infos,
+  scaleOf,
+  triggerOf,
+  withChannels,
+  withoutGoneAxis,
+} from './setup'
 
 const info = (key: string, more: Partial<ScopeChannelInfo> = {}): [string, ScopeChannelInfo] => [
   `x ${key}`,
@@ -74,5 +82,21 @@ describe('a channel', () => {
     })
     expect(scaleOf({ show: 'own', ...own }, known)).toEqual(own)
     expect(scaleOf({ show: 'axis', ...own }, { ...known, axis_factor: null }).unit).toBe('inc/s')
+  })
+})
+
+describe('a trigger on an axis that is gone', () => {
+  it('seeks nothing, and samples nothing for it', () => {
+    for (const kind of ['fault', 'motion'] as const) {
+      const setup = armed({ kind })
+      const left = withoutGoneAxis(setup, [{ id: 'y' }])
+      expect(triggerOf(left, none)).toBeNull()
+      expect(configOf(left, none).sources).toHaveLength(1)
+      expect(withoutGoneAxis(setup, [{ id: 'x' }])).toBe(setup)
+      // Not known yet.
+      expect(withoutGoneAxis(setup, null)).toBe(setup)
+    }
+    const rising = armed({ kind: 'rising', trace: 'c1', drive: 'gone' })
+    expect(withoutGoneAxis(rising, [])).toBe(rising)
   })
 })

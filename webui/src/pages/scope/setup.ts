@@ -165,6 +165,16 @@ export const needsLevel = (kind: string) =>
 export const needsHigh = (kind: string) => kind === 'enters' || kind === 'leaves'
 export const needsBit = (kind: string) => kind === 'bit_set' || kind === 'bit_clear'
 
+/** The set-up without a trigger on an axis that is not there; `drives` is null while not known. */
+export function withoutGoneAxis(
+  setup: ScopeSetup,
+  drives: readonly { id: string }[] | null,
+): ScopeSetup {
+  const { kind, drive } = setup.trigger
+  const gone = drives !== null && needsDrive(kind) && !drives.some((each) => each.id === drive)
+  return gone ? { ...setup, trigger: { ...setup.trigger, mode: 'off' } } : setup
+}
+
 export function triggerOf(setup: ScopeSetup, infos: Infos): ScopeTrigger | null {
   const { mode, kind, trace, drive, level, high, bit, before } = setup.trigger
   if (mode === 'off') return null
