@@ -97,3 +97,13 @@ def test_stop_does_not_wait_for_a_scope_that_ends(station: Station, x: str) -> N
 
 def wait_for_samples(page: Live) -> None:
     until(lambda: page.receive() and page.binary, HANG_S)
+
+
+def test_the_answers_of_a_stop_carry_the_number_of_its_press(station: Station) -> None:
+    with station.live() as page:
+        for press in (7, 8):
+            page.send(type="stop", press=press)
+        for press in (7, 8):
+            page.wait("stop_taken", press=press)
+        for press in (7, 8):
+            page.wait("stop_result", press=press)

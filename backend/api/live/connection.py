@@ -249,6 +249,7 @@ class Connection:
         # On a machine with two axes, the other one is stopped as well.
         stopped = list(problems)
         taken = StopTaken(
+            press=request.press,
             drives=stopped,
             problems={drive: words_of(why) for drive, why in failed.items()},
             problem_messages={drive: message_of(why) for drive, why in failed.items()},
@@ -258,13 +259,16 @@ class Connection:
             failure = DriveError("api-live.stop-not-reach", drive=drive, text=why)
             self.send(Refused(request="stop", problem=problem_of(failure)))
         # The connection keeps receiving in the meantime: STOP may be pressed again.
-        task = asyncio.create_task(self._stopped(drives, stopped), name=f"stop-answer-{self.id}")
+        task = asyncio.create_task(
+            self._stopped(request.press, drives, stopped), name=f"stop-answer-{self.id}"
+        )
         self._stops.add(task)
         task.add_done_callback(self._stops.discard)
 
-    async def _stopped(self, drives: list[str], stopped: list[str]) -> None:
+    async def _stopped(self, press: int | None, drives: list[str], stopped: list[str]) -> None:
         found = await self._bench.motion.standstill(stopped)
-        self.send(StopReached(result=stop_result(self._bench, drives, found)))
+        result = stop_result(self._bench, drives, found)
+        self.send(StopReached(press=press, result=result))
 
     def _lease(self, request: LeaseTake) -> None:
         self._bench.connected(request.drive)

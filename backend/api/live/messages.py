@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, TypeAdapter
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from backend.api.drive.models_axis import AxisState, StopResult
 from backend.api.drive.models_parameters import ParameterValue
@@ -101,11 +101,24 @@ class JogStop(Message):
     reason: ReleaseOfPage = "released"
 
 
+def _press(number: object) -> int | None:
+    """The number of a press; anything else is none, since no STOP may be refused for it."""
+    return number if type(number) is int and 0 <= number < 2**53 else None
+
+
+Press = Annotated[
+    int | None,
+    BeforeValidator(_press),
+    Field(description="number of this press on the page; its answers carry it"),
+]
+
+
 class StopAll(Message):
     """STOP. Same as POST /stop, on the connection that is already open."""
 
     type: Literal["stop"] = "stop"
     drive: str | None = None
+    press: Press = None
 
 
 class LeaseTake(Message):
@@ -271,6 +284,7 @@ class StopTaken(Message):
     """STOP has sent its quick stop; its verdict follows as ``stop_result``."""
 
     type: Literal["stop_taken"] = "stop_taken"
+    press: int | None = Field(default=None, description="number of the press that is answered")
     drives: list[str]
     problems: dict[str, str] = Field(description="drives that did not take it yet, and why")
     problem_messages: dict[str, MessageInfo] = Field(
@@ -282,6 +296,7 @@ class StopReached(Message):
     """Verdicts of this connection's STOP."""
 
     type: Literal["stop_result"] = "stop_result"
+    press: int | None = Field(default=None, description="number of the press that is answered")
     result: StopResult
 
 

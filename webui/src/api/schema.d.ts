@@ -12844,6 +12844,12 @@ export interface components {
              */
             drive: string | null;
             /**
+             * Press
+             * @description number of this press on the page; its answers carry it
+             * @default null
+             */
+            press: number | null;
+            /**
              * @description discriminator enum property added by openapi-typescript
              * @enum {string}
              */
@@ -12854,6 +12860,12 @@ export interface components {
          * @description Verdicts of this connection's STOP.
          */
         StopReached: {
+            /**
+             * Press
+             * @description number of the press that is answered
+             * @default null
+             */
+            press: number | null;
             result: components["schemas"]["StopResult"];
             /**
              * @description discriminator enum property added by openapi-typescript
@@ -12937,6 +12949,12 @@ export interface components {
         StopTaken: {
             /** Drives */
             drives: string[];
+            /**
+             * Press
+             * @description number of the press that is answered
+             * @default null
+             */
+            press: number | null;
             /**
              * Problem Messages
              * @description of problems, as code and facts, by the same drives

@@ -117,11 +117,11 @@ function receive(message: ToPage): void {
       store.publish('refused')
       break
     case 'stop_taken':
-      store.contents.stopTaken = Date.now()
+      store.contents.stopTaken = { press: message.press }
       store.publish('stopTaken')
       break
     case 'stop_result':
-      store.contents.stopReached = { at: Date.now(), result: message.result }
+      store.contents.stopReached = { press: message.press, result: message.result }
       store.publish('stopReached')
       break
     case 'pong':

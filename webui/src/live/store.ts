@@ -39,8 +39,8 @@ interface Contents {
   trigger: TriggerState
   refused: { request: string; problem: Problem; at: number } | null
   /** When the server last said that this page's STOP has gone out, and what it reached. */
-  stopTaken: number | null
-  stopReached: { at: number; result: StopResult } | null
+  stopTaken: { press: number | null } | null
+  stopReached: { press: number | null; result: StopResult } | null
 }
 
 const LOG_LENGTH = 500

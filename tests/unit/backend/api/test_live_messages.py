@@ -41,3 +41,10 @@ def test_no_message_is_left_out(module: ModuleType, schemas: dict[str, Any]) -> 
     ]
     assert made
     assert [each for each in made if each not in known] == []
+
+
+@pytest.mark.parametrize("press", [None, 7, "7", -1, 1.5, True, [], {"a": 1}, 2**70, "x" * 1000])
+def test_no_number_of_a_press_makes_a_stop_invalid(press: object) -> None:
+    request = messages.from_page.validate_python({"type": "stop", "press": press})
+    assert isinstance(request, messages.StopAll)
+    assert request.press == (7 if press == 7 else None)

@@ -6,6 +6,8 @@ import { contents, publish, subscribe } from '../../live/store'
 /** What the last STOP reached. `null` answer: the server has not answered yet. */
 export interface StopReport {
   at: number
+  /** Number of the press on this page: an answer to an earlier one does not count for it. */
+  press: number
   answer: StopResult | null
   /** Set when neither way to the server worked, or nothing says that one did. */
   failure: string | null
@@ -20,12 +22,13 @@ export interface StopReport {
 const TAKEN_MS = 3000
 
 let report: StopReport | null = null
-/** The STOP whose request has neither an answer nor an error yet, by its time. */
+/** The press whose request has neither an answer nor an error yet. */
 let waiting: number | null = null
 
 export const currentReport = () => report
 
 let pressed = -Infinity
+let presses = 0
 
 /** When STOP was last pressed on this page. */
 export const pressedAt = () => pressed
@@ -48,19 +51,21 @@ export async function stopEverything(): Promise<void> {
     keepalive: true,
     priority: 'high',
   })
-  const mine: StopReport = { at: Date.now(), answer: null, failure: null, taken: false }
+  presses += 1
+  const press = presses
+  const mine: StopReport = { at: Date.now(), press, answer: null, failure: null, taken: false }
   pressed = mine.at
   try {
-    live.send({ type: 'stop', drive: null })
+    live.send({ type: 'stop', drive: null, press })
     live.jogStop('stop')
   } catch (error) {
     console.error('STOP could not be sent over the websocket', error)
   }
   report = mine
-  waiting = mine.at
+  waiting = press
   publish('stop')
   setTimeout(() => {
-    if (report?.at === mine.at && !report.taken) reportUnknown()
+    if (report?.press === press && !report.taken) reportUnknown()
   }, TAKEN_MS)
   try {
     const answer = await request
@@ -79,8 +84,9 @@ export async function stopEverything(): Promise<void> {
 export function listenForAnswers(): void {
   subscribe('stopTaken', () => {
     if (report === null || report.answer !== null) return
+    if (contents.stopTaken?.press !== report.press) return
     // An answer that was missing has come; a request that failed is still a failure.
-    report = { ...report, taken: true, failure: waiting === report.at ? null : report.failure }
+    report = { ...report, taken: true, failure: waiting === report.press ? null : report.failure }
     publish('stop')
   })
   subscribe('link', () => {
@@ -88,7 +94,7 @@ export function listenForAnswers(): void {
   })
   subscribe('stopReached', () => {
     const reached = contents.stopReached
-    if (report === null || report.answer !== null || reached === null) return
+    if (report === null || report.answer !== null || reached?.press !== report.press) return
     report = { ...report, answer: reached.result, failure: null }
     publish('stop')
   })
@@ -102,8 +108,8 @@ function reportUnknown(): void {
 }
 
 function finish(mine: StopReport, result: Pick<StopReport, 'answer' | 'failure'>): void {
-  if (waiting === mine.at) waiting = null
-  if (report?.at !== mine.at) return
+  if (waiting === mine.press) waiting = null
+  if (report?.press !== mine.press) return
   // The verdicts have come by the websocket already.
   if (result.answer === null && report.answer !== null) return
   report = { ...mine, ...result }
