@@ -129,6 +129,29 @@ describe('the store', () => {
     ])
     expect(gone).toEqual(['a', 'b'])
   })
+  it('tells drives with the same id by serial number, else by place', () => {
+    const gone: string[] = []
+    whenGone((id) => gone.push(id))
+    const one = (serial: number | null, ...stations: number[]) => {
+      const ports = stations.map((station) => ({ url: 'u', station }))
+      setDrives([{ id: 's', profile: 'p', serial, ports } as unknown as DriveSummary])
+      return gone.splice(0)
+    }
+    setDrives([])
+    gone.splice(0)
+    expect(one(null, 1)).toEqual([])
+    expect(one(7, 1)).toEqual([])
+    // Not answering, it has no number, and then the same one, or another.
+    expect(one(null, 1)).toEqual([])
+    expect(one(7, 2)).toEqual([])
+    expect(one(null, 2)).toEqual([])
+    expect(one(8, 2)).toEqual(['s'])
+    setDrives([])
+    gone.splice(0)
+    expect(one(null, 1, 5)).toEqual([])
+    expect(one(null, 5)).toEqual([])
+    expect(one(null, 6)).toEqual(['s'])
+  })
   it('ends jobs that the server has forgotten, and no others', () => {
     setJob({ ...job('running'), id: 'old' })
     setJob({ ...job('running'), id: 'kept' })

@@ -139,17 +139,61 @@ export function setLink(link: LinkState, now: number): void {
   publish('link')
 }
 
+/** What tells a drive from another one that has its id. */
+export interface DriveIdentity {
+  profile: string
+  serial: number | null
+  /** Bus and station of each port. */
+  places: string[]
+}
+
+export function identityOf(drive: DriveSummary): DriveIdentity {
+  const { profile, serial, ports } = drive as Pick<DriveSummary, 'profile'> & Partial<DriveSummary>
+  const places = (ports ?? []).map(({ url, station }) => `${url} ${station}`)
+  return { profile, serial: serial ?? null, places }
+}
+
+/** By the serial numbers; where a drive has none, by its place. */
+export function sameDrive(one: DriveIdentity, other: DriveIdentity): boolean {
+  if (one.profile !== other.profile) return false
+  if (one.serial !== null && other.serial !== null) return one.serial === other.serial
+  const placed = one.places.length > 0 && other.places.length > 0
+  return !placed || one.places.some((place) => other.places.includes(place))
+}
+
+const identities = new Map<string, DriveIdentity>()
+
+/** Ids that have another drive now, or none. A serial number that was said once is kept. */
+function identify(drives: DriveSummary[]): string[] {
+  const changed: string[] = []
+  for (const [id, was] of [...identities]) {
+    const drive = drives.find((each) => each.id === id)
+    if (drive && sameDrive(was, identityOf(drive))) continue
+    identities.delete(id)
+    changed.push(id)
+  }
+  for (const drive of drives) {
+    const now = identityOf(drive)
+    identities.set(drive.id, {
+      ...now,
+      serial: now.serial ?? identities.get(drive.id)?.serial ?? null,
+    })
+  }
+  return changed
+}
+
+/** The drive that has an id now; null where that is not known. */
+export const identityNow = (id: string): DriveIdentity | null => identities.get(id) ?? null
+
 /**
- * The drives as they are now. An id is used again: of one that is gone, or of another profile than
- * before, nothing that was said holds. Returns those that are there and of which more was known.
+ * The drives as they are now. An id is used again: of one that is gone, or that another drive has
+ * now, nothing that was said holds. Returns those that are there and of which more was known.
  */
 export function setDrives(drives: DriveSummary[]): string[] {
-  const changed = (contents.drives ?? []).filter(
-    (old) => drives.find((each) => each.id === old.id)?.profile !== old.profile,
-  )
+  const changed = identify(drives)
   contents.drives = drives
   const again: string[] = []
-  for (const { id } of changed) {
+  for (const id of changed) {
     const known = contents.rows.delete(id)
     contents.states.delete(id)
     contents.readings.delete(id)
@@ -157,7 +201,7 @@ export function setDrives(drives: DriveSummary[]): string[] {
     for (const act of goneListeners) act(id)
   }
   publish('drives')
-  for (const { id } of changed) {
+  for (const id of changed) {
     for (const topic of ['state', 'rows', 'values']) publish(`${topic} ${id}`)
   }
   return again

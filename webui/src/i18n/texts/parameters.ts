@@ -8,6 +8,10 @@ export const parameters = {
   'parameters.group': ['Group', '分组'],
   'parameters.allGroups': ['All groups ({count})', '全部分组（{count}）'],
   'parameters.filter': ['Show', '显示'],
+  'parameters.dropped': [
+    '{count} typed {count|value was|values were} dropped: {count|it was|they were} typed for a drive that this axis has no more.',
+    '已丢弃 {count} 个已输入的值：它们是为此轴先前的驱动器输入的。',
+  ],
   'parameters.raw': ['Raw values', '原始值'],
   'parameters.live': ['Live', '实时'],
   'parameters.readAll': ['Read all', '全部读取'],

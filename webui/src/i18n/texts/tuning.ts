@@ -312,6 +312,10 @@ export const tuning = {
   'undo.gains': ['Gains were written.', '已写入增益。'],
   'undo.candidate': ['A set of gains and notches was written.', '已写入一组增益和陷波。'],
   'undo.undo': ['A change was undone.', '已撤销更改。'],
+  'undo.foreign': [
+    '{count} {count|change|changes} of another drive, which had this axis before, {count|was|were} dropped: an undo would write its values into this one.',
+    '已丢弃此轴先前所接另一驱动器的 {count} 项更改：撤销会将其数值写入当前驱动器。',
+  ],
   'undo.button': ['Undo', '撤销'],
   'undo.all': ['Undo anyway', '仍然撤销'],
   'undo.what': ['Values from before ({count})', '之前的值（{count}）'],

@@ -13,7 +13,7 @@ import { OriginalSwitch } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
 import { useAction } from '../../widgets/useAction'
 import { Detail } from './Detail'
-import { discardEdits, useEdits, useFavourites, writeEdits } from './edits'
+import { discardEdits, useEdits, useFavourites, writeEdits, noteDropped } from './edits'
 import { FILTERS, type Filter, groups, select, settingsFirst } from './filters'
 import { Grid } from './Grid'
 
@@ -38,7 +38,7 @@ export function ParameterTable({
   const searchBox = useRef<HTMLInputElement>(null)
   const rows = useMemo(() => settingsFirst(inProfileOrder), [inProfileOrder])
   const readings = useReadings(drive.id)
-  const { edits, differs } = useEdits(drive.id)
+  const { edits, differs, dropped } = useEdits(drive.id)
   const favourites = useFavourites(drive.profile)
   const wanted = useDeferredValue(search)
   const byGroup = useMemo(() => groups(rows), [rows])
@@ -54,6 +54,14 @@ export function ParameterTable({
   return (
     <div className="parameters">
       <Actions drive={drive} shown={shown} />
+      {dropped > 0 && (
+        <p className="note warn" role="status">
+          {t('parameters.dropped', { count: dropped })}{' '}
+          <button type="button" className="plain" onClick={() => noteDropped(drive.id)}>
+            {t('close')}
+          </button>
+        </p>
+      )}
       <div className="filters">
         <TextInput
           ref={searchBox}

@@ -3,11 +3,12 @@ import { asked, later, serve, settled, shown, type } from '../../testing/page'
 import { fireEvent, screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it } from 'vitest'
-import type { ParameterRow, ParameterValue } from '../../api/schema'
-import { setReadings, setRows } from '../../live/store'
+import type { DriveSummary, ParameterRow, ParameterValue } from '../../api/schema'
+import { setDrives, setReadings, setRows } from '../../live/store'
 import { Editor } from './Detail'
 import { discardEdits, type Edit, setEdit, useEdits, writeEdits } from './edits'
 import { Grid } from './Grid'
+import { ParameterTable } from './ParameterTable'
 
 const reading = (key: string, raw: number, part: Partial<ParameterValue> = {}): ParameterValue => ({
   key,
@@ -155,5 +156,49 @@ describe('writing', () => {
     expect(asked.map((each) => each.method)).toEqual(['PUT'])
     expect(edits.has(first.key)).toBe(true)
     expect(problems.has(first.key)).toBe(true)
+  })
+})
+
+describe('values typed for a drive that has gone', () => {
+  const drive = (serial: number) =>
+    ({ id: X, name: 'X', profile: 'p', serial, ports: [], unsaved: 0, pending: 0 }) as unknown as
+      DriveSummary // prettier-ignore
+
+  it('are dropped with a notice, and not written to the one that has its id now', async () => {
+    setDrives([drive(1)])
+    setRows(X, rows)
+    setEdit(X, '2001:00', { text: '60', asRaw: false })
+    setEdit(X, '2002:00', { text: '31', asRaw: false })
+    await shown(
+      <>
+        <Seen />
+        <ParameterTable drive={drive(2)} rows={rows} asked={null} />
+      </>,
+    )
+    await settled(() => setDrives([drive(2)]))
+    expect(edits.size).toBe(0)
+    expect(screen.getByText(/^2 typed values were dropped/)).not.toBeNull()
+    await settled(() => writeEdits(X, ['2001:00', '2002:00']))
+    expect(asked.some((each) => each.method === 'PUT')).toBe(false)
+    await userEvent.click(screen.getByRole('button', { name: 'Close' }))
+    expect(screen.queryByText(/typed values were dropped/)).toBeNull()
+  })
+
+  it('are not written on where it goes in the middle of them', async () => {
+    const many = Array.from({ length: 20 }, (_, i) => row(`30${String(10 + i)}:00`, 1))
+    setDrives([drive(1)])
+    setRows(X, many)
+    for (const { key } of many) setEdit(X, key, { text: '2', asRaw: false })
+    const first = later<object>()
+    serve(() => first.promise)
+    const writing = writeEdits(
+      X,
+      many.map((each) => each.key),
+    )
+    await settled()
+    await settled(() => setDrives([drive(2)]))
+    await settled(() => first.give([]))
+    await writing
+    expect(asked.filter((each) => each.method === 'PUT')).toHaveLength(1)
   })
 })

@@ -1,6 +1,6 @@
 import { api, ask, problemOf } from '../../api/client'
 import type { Problem, WriteResult } from '../../api/schema'
-import { contents, publish, setReadings, useStore } from '../../live/store'
+import { contents, publish, setReadings, useStore, whenGone } from '../../live/store'
 import { toValue } from '../../widgets/numbers/format'
 import { parseTyped } from '../../widgets/numbers/parse'
 import type { ParameterInfo } from '../../widgets/types'
@@ -17,6 +17,8 @@ interface DriveEdits {
   problems: ReadonlyMap<string, Problem>
   differs: ReadonlyMap<string, string>
   writing: { done: number; total: number } | null
+  /** Typed values that were dropped, because another drive has the id now, or none. */
+  dropped: number
 }
 
 const EMPTY: DriveEdits = {
@@ -24,6 +26,7 @@ const EMPTY: DriveEdits = {
   problems: new Map(),
   differs: new Map(),
   writing: null,
+  dropped: 0,
 }
 const CHUNK = 16
 const byDrive = new Map<string, DriveEdits>()
@@ -34,6 +37,19 @@ function change(drive: string, part: Partial<DriveEdits>): void {
   byDrive.set(drive, { ...get(drive), ...part })
   publish(`edits ${drive}`)
 }
+
+/** Counts the drives that had an id: what was typed for one is not written to another. */
+const turns = new Map<string, number>()
+const turnOf = (drive: string) => turns.get(drive) ?? 0
+
+whenGone((drive) => {
+  turns.set(drive, turnOf(drive) + 1)
+  const { edits, dropped } = get(drive)
+  byDrive.set(drive, { ...EMPTY, dropped: dropped + edits.size })
+  publish(`edits ${drive}`)
+})
+
+export const noteDropped = (drive: string) => change(drive, { dropped: 0 })
 
 export const useEdits = (drive: string) => useStore(`edits ${drive}`, () => get(drive))
 
@@ -81,8 +97,9 @@ export async function writeEdits(drive: string, keys: string[]): Promise<Problem
     return edit && row ? [{ key, edit, row }] : []
   })
   let done = 0
+  const turn = turnOf(drive)
   try {
-    for (let i = 0; i < wanted.length; i += CHUNK) {
+    for (let i = 0; i < wanted.length && turn === turnOf(drive); i += CHUNK) {
       change(drive, { writing: { done, total: wanted.length } })
       const chunk = wanted.slice(i, i + CHUNK)
       const values: Record<string, { raw: string | number | null; value: number | null }> = {}
@@ -96,6 +113,8 @@ export async function writeEdits(drive: string, keys: string[]): Promise<Problem
           body: { values },
         }),
       )
+      // Read back from a drive that has this id no more.
+      if (turn !== turnOf(drive)) break
       settle(drive, results, new Map(chunk.map(({ key, edit }) => [key, edit])))
       done += chunk.length
     }

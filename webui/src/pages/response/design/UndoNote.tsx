@@ -5,7 +5,7 @@ import { useT } from '../../../i18n'
 import { dateTime } from '../../../widgets/numbers/format'
 import { ProblemNote } from '../../../widgets/ProblemNote'
 import { useAction } from '../../../widgets/useAction'
-import { changedSince, forget, noteUndone, useChanges } from './undo'
+import { changedSince, forget, noteForeign, noteUndone, useChanges, useForeign } from './undo'
 
 /** The newest change to an axis, with the way back. */
 export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => void }) {
@@ -13,7 +13,23 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
   const last = useChanges(drive).at(-1)
   const act = useAction()
   const [tried, setTried] = useState('')
-  if (!last) return <ProblemNote problem={act.problem} onClose={act.clear} />
+  const foreign = useForeign(drive)
+  const others = foreign > 0 && (
+    <p className="note warn" role="status">
+      {t('undo.foreign', { count: foreign })}{' '}
+      <button type="button" className="plain" onClick={() => noteForeign(drive)}>
+        {t('close')}
+      </button>
+    </p>
+  )
+  if (!last) {
+    return (
+      <>
+        {others}
+        <ProblemNote problem={act.problem} onClose={act.clear} />
+      </>
+    )
+  }
   // A refusal is of the change that was to be undone, not of one written since.
   const since = tried === last.time && changedSince(act.problem, last.before)
   const undo = () =>
@@ -32,6 +48,7 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
     })
   return (
     <div className="note info">
+      {others}
       <div className="row wrap middle">
         <span className="grow">
           {t(`undo.${last.what}`)} <span className="num dim">{dateTime(last.time)}</span>

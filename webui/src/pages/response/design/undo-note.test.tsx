@@ -3,8 +3,8 @@ import { asked, later, refusal, serve, settled, shown, type } from '../../../tes
 import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it, vi } from 'vitest'
-import type { ParameterRow, ParameterValue } from '../../../api/schema'
-import { setReadings, setRows } from '../../../live/store'
+import type { DriveSummary, ParameterRow, ParameterValue } from '../../../api/schema'
+import { setDrives, setReadings, setRows } from '../../../live/store'
 import { ParameterFields } from '../../../widgets/parameters/ParameterFields'
 import { remember, useChanges } from './undo'
 import { UndoNote } from './UndoNote'
@@ -65,6 +65,32 @@ describe('an undo', () => {
     remember(drive, 'candidate', { before: { c: 1 } })
     await shown(<Note />)
     expect(changes.map((each) => each.what)).toEqual(['gains', 'notches', 'candidate'])
+  })
+})
+
+describe('changes of another drive that had the id before', () => {
+  const there = (serial: number) =>
+    setDrives([{ id: drive, profile: 'p', serial, ports: [] } as unknown as DriveSummary])
+
+  it('are dropped with a notice, also where they were kept by an earlier visit', async () => {
+    there(1)
+    remember(drive, 'gains', { before: { a: 1 } })
+    remember(drive, 'notches', { before: { b: 1 } })
+    await shown(<Note />)
+    expect(changes).toHaveLength(2)
+    // The same drive, which was away for a while.
+    await settled(() => setDrives([]))
+    await settled(() => there(1))
+    expect(changes).toHaveLength(2)
+    await settled(() => there(2))
+    expect(changes).toEqual([])
+    expect(screen.queryByRole('button', { name: 'Undo' })).toBeNull()
+    expect(screen.getByText(/^2 changes of another drive/)).not.toBeNull()
+    expect(localStorage.getItem(`servodeck.${drive}.tune.undo`)).toBe('[]')
+    await press('Close')
+    expect(screen.queryByText(/changes of another drive/)).toBeNull()
+    await settled(() => remember(drive, 'gains', { before: { c: 1 } }))
+    expect(changes.map((each) => each.before)).toEqual([{ c: 1 }])
   })
 })
 
