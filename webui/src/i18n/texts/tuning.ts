@@ -538,6 +538,10 @@ export const tuning = {
   'candidate.settling': ['Settling', '调节时间'],
   'candidate.overshoot': ['Overshoot', '超调'],
   'candidate.cost': ['Phase lost to notches', '陷波相位损失'],
+  'candidate.half': [
+    'Half written: the gains of this design are in force, its notches were refused or not confirmed. The loop may oscillate without them. Undo the gains before the axis is enabled, or apply the design again.',
+    '仅写入一半：该设计的增益已生效，其陷波被拒绝或未得到确认。没有陷波，环路可能振荡。请在使能该轴之前撤销增益，或重新应用该设计。',
+  ],
   'candidate.written': [
     'Written, not verified yet. Measure the speed loop now, on the page',
     '已写入，尚未验证。请测量速度环：',

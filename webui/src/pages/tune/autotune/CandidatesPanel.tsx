@@ -12,6 +12,7 @@ import { useAction } from '../../../widgets/useAction'
 import { fixed, hertz } from '../../response/plot/bode'
 import type { Candidate } from '../../response/results'
 import { remember } from '../../response/design/undo'
+import { UndoNote } from '../../response/design/UndoNote'
 import { CandidateTable } from './CandidateTable'
 import { amount } from '../steps'
 
@@ -52,6 +53,8 @@ export function CandidatesPanel({
   const [total, setTotal] = useState<number | null>(null)
   const [found, setFound] = useState<Designs | null>(null)
   const [asked, setAsked] = useState<{ candidate: Candidate; inertia: number } | null>(null)
+  /** The gains were written, the notches that belong to them were not. */
+  const [half, setHalf] = useState(false)
   const [written, setWritten] = useState(false)
   const design = useAction()
   const write = useAction()
@@ -84,6 +87,7 @@ export function CandidatesPanel({
   const apply = (candidate: Candidate, inertia_kgm2: number) =>
     write.run(async () => {
       setWritten(false)
+      setHalf(false)
       // Asked first: a family without notches has nothing to write, any other failure ends it here.
       const hasNotches = await documentsNotches(drive)
       const path = { params: { path: { drive_id: drive } } }
@@ -97,13 +101,18 @@ export function CandidatesPanel({
       // Kept at once: the way back must be there even when the notches are refused.
       remember(drive, 'gains', gains)
       if (hasNotches) {
-        const notches = await ask(
-          api.PUT('/api/v1/drives/{drive_id}/notches', {
-            ...path,
-            body: { notches: candidate.notches },
-          }),
-        )
-        remember(drive, 'notches', notches)
+        try {
+          const notches = await ask(
+            api.PUT('/api/v1/drives/{drive_id}/notches', {
+              ...path,
+              body: { notches: candidate.notches },
+            }),
+          )
+          remember(drive, 'notches', notches)
+        } catch (error) {
+          setHalf(true)
+          throw error
+        }
       }
       setWritten(true)
       await onApplied()
@@ -167,6 +176,21 @@ export function CandidatesPanel({
         </>
       )}
       <ProblemNote problem={write.problem} onClose={write.clear} />
+      {half && (
+        <>
+          <p className="note fault" role="alert">
+            {t('candidate.half')}
+          </p>
+          <UndoNote
+            drive={drive}
+            onUndone={() => {
+              setHalf(false)
+              write.clear()
+              void onApplied()
+            }}
+          />
+        </>
+      )}
       {written && (
         <p className="note good">
           {t('candidate.written')} <a href={href('response', drive)}>{t('page.response')}</a>

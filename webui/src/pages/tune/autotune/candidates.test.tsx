@@ -46,6 +46,7 @@ const apply = async () => {
   await write()
 }
 const designs = () => screen.queryByRole('table')
+const half = () => screen.queryByText(/^Half written/)
 const written = () => screen.queryByText(/Written, not verified yet/)
 
 beforeEach(() => {
@@ -96,5 +97,35 @@ describe('designs of a stored response', () => {
     refused = true
     await apply()
     expect(written()).toBeNull()
+  })
+
+  it('are called half written where only the notches were refused, with the way back', async () => {
+    const notches = [{ center_hz: 400, width_hz: 100, depth_db: -20 }]
+    let allow = false
+    serve(({ method, path }) => {
+      if (path.endsWith('/tune/candidates')) {
+        return { load: 'stiff', candidates: [{ ...candidate, notches }] }
+      }
+      if (method === 'GET') return []
+      if (path.endsWith('/notches') && !allow) return 409
+      return { before: { '2005:03': 1 }, after: { '2005:03': 2 } }
+    })
+    await panel(0.001)
+    await design()
+    await apply()
+    expect(written()).toBeNull()
+    expect(half()?.textContent).toContain('the gains of this design are in force')
+    expect(screen.getByText('Gains were written.')).not.toBeNull()
+    await userEvent.click(button('Undo'))
+    await settled()
+    expect(sent('/tune/undo')?.body).toEqual({ before: { '2005:03': 1 }, after: { '2005:03': 2 } })
+    expect(half()).toBeNull()
+    // Applied again without a refusal, nothing is said of halves.
+    await apply()
+    expect(half()).not.toBeNull()
+    allow = true
+    await apply()
+    expect(half()).toBeNull()
+    expect(written()).not.toBeNull()
   })
 })
