@@ -61,6 +61,7 @@ TITLES = {
     "bad-description": "Not a usable description",
     "bad-parameter-set": "Not a usable parameter set",
     "bad-recording": "Not a usable recording",
+    "changed-meanwhile": "Changed meanwhile",
     "bad-measurement": "Not a usable measurement",
     "bad-snapshot": "Not a usable snapshot",
     "storage-failed": "Could not be stored",

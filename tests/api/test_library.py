@@ -219,6 +219,28 @@ async def test_library_lists_tags_and_versions(http: httpx.AsyncClient) -> None:
     assert back.json()["deleted"] is None
 
 
+async def test_notes_that_another_person_changed_are_not_overwritten(
+    http: httpx.AsyncClient,
+) -> None:
+    entry = (await put(http, set_of(350)))["entry"]
+
+    async def change(**body: object) -> httpx.Response:
+        return await http.patch(f"/library/{entry}", json=body)
+
+    assert (await change(notes="first", base_notes="")).status_code == 200
+    # Both had read the empty notes.
+    late = await change(notes="second", base_notes="")
+    assert (late.status_code, late.json()["type"]) == (409, "urn:servodeck:changed-meanwhile")
+    assert (late.json()["parameter"], late.json()["value"]) == ("notes", "first")
+    assert (await http.get(f"/library/{entry}")).json()["notes"] == "first"
+    assert (await change(notes="first", base_notes="")).status_code == 200, "the same text"
+    assert (await change(notes="second", base_notes="first")).json()["notes"] == "second"
+    assert (await change(tags=["b", "a"], base_tags=[])).status_code == 200
+    late = await change(tags=["c"], base_tags=[])
+    assert (late.status_code, late.json()["parameter"]) == (409, "tags")
+    assert (await change(tags=["c"], base_tags=["a", "b"])).json()["tags"] == ["c"]
+
+
 async def test_files_of_the_station_are_listed_and_not_copied(
     http: httpx.AsyncClient, tmp_path: Path
 ) -> None:

@@ -95,6 +95,10 @@ def test_record_list_export_delete(station: Station, x: str) -> None:
         station.http.patch(f"/recordings/{name}", json={"notes": "cold", "kept": True})
     )
     assert (changed["notes"], changed["tags"], changed["kept"]) == ("cold", ["before"], True)
+    late = station.http.patch(
+        f"/recordings/{name}", json={"notes": "warm", "base_notes": "WARM axis"}
+    )
+    assert (late.status_code, late.json()["value"]) == (409, "cold")
     assert station.ok(station.http.get(f"/recordings/{name}"))["info"]["exports"] == [
         "csv",
         "csv_raw",

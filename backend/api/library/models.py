@@ -84,6 +84,14 @@ class LibraryChange(Message):
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[TagText] | None = Field(default=None, max_length=20)
     deleted: Literal[False] | None = Field(default=None, description="false restores it")
+    base_notes: str | None = Field(
+        default=None,
+        max_length=4000,
+        description="the notes that were changed; refused where they are different by now",
+    )
+    base_tags: list[TagText] | None = Field(
+        default=None, max_length=20, description="the tags that were changed, in the same way"
+    )
 
 
 class StoredSet(SetFileInfo):

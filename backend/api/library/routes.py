@@ -24,7 +24,7 @@ from backend.api.library.models import (
 from backend.api.scope.recordings import TheRecordings
 from backend.api.times import in_utc
 from backend.records.library import NotInLibrary, sharing
-from backend.records.library.entries import Entry
+from backend.records.library.entries import Entry, Remarks, require_unchanged
 from backend.records.library.entries import Query as LibraryQuery
 from backend.station.bench import Bench
 from backend.station.recording.service import Recordings
@@ -192,13 +192,16 @@ async def change_library_entry(
         records = bench.records
         entry = _entry(bench, entry_id)
         tags = tuple(change.tags) if change.tags is not None else None
+        base_tags = tuple(change.base_tags) if change.base_tags is not None else None
+        base = Remarks(change.base_notes, base_tags)
+        require_unchanged(Remarks(entry.notes, entry.tags), base, Remarks(change.notes, tags))
         if entry.kind == "recording" and entry.station == records.station:
             # The remarks of a recording are stored next to its file, and belong to it.
             recordings.library.annotate(entry.name, notes=change.notes, tags=tags, kept=None)
         if change.deleted is False:
             entry = records.library.undelete(entry_id)
         if change.notes is not None or tags is not None:
-            entry = records.library.annotate(entry_id, notes=change.notes, tags=tags)
+            entry = records.library.annotate(entry_id, notes=change.notes, tags=tags, base=base)
         return entry
 
     entry = await bench.records.store.call(work)

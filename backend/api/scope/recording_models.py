@@ -117,6 +117,14 @@ class ChangeRecording(Message):
     notes: str | None = Field(default=None, max_length=4000)
     tags: list[str] | None = Field(default=None, max_length=20)
     kept: bool | None = None
+    base_notes: str | None = Field(
+        default=None,
+        max_length=4000,
+        description="the notes that were changed; refused where they are different by now",
+    )
+    base_tags: list[str] | None = Field(
+        default=None, max_length=20, description="the tags that were changed, in the same way"
+    )
 
 
 class RecordingEvent(Message):

@@ -35,6 +35,7 @@ from backend.api.scope.recording_models import (
 from backend.foundation.people.identity import acting_person
 from backend.foundation.store.free_space import RESERVE_BYTES
 from backend.records.audit.asked import note_before
+from backend.records.library.entries import Remarks, require_unchanged
 from backend.records.recording.chunks import Samples
 from backend.records.recording.library import Retention, Stored
 from backend.records.recording.reader import Channel, RecordingReader
@@ -330,10 +331,15 @@ async def change_recording(
     _existing(recordings, name)
     recordings.require_ended(name)
     tags = None if request.tags is None else tuple(request.tags)
-    stored = await asyncio.to_thread(
-        lambda: recordings.library.annotate(name, notes=request.notes, tags=tags, kept=request.kept)
-    )
-    return _stored(stored)
+    base_tags = None if request.base_tags is None else tuple(request.base_tags)
+    base = Remarks(request.base_notes, base_tags)
+
+    def work() -> Stored:
+        known = recordings.library.describe(name).remarks
+        require_unchanged(Remarks(known.notes, known.tags), base, Remarks(request.notes, tags))
+        return recordings.library.annotate(name, notes=request.notes, tags=tags, kept=request.kept)
+
+    return _stored(await asyncio.to_thread(work))
 
 
 @router.delete("/recordings/{name}", status_code=204)

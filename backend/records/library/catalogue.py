@@ -29,7 +29,9 @@ from backend.records.library.entries import (
     Entry,
     Kind,
     Query,
+    Remarks,
     Version,
+    require_unchanged,
 )
 from drivers.errors import NotAllowed
 from drivers.texts import limits
@@ -190,12 +192,20 @@ class Library:
             return _loaded(item), fresh
 
     def annotate(
-        self, entry_id: int, *, notes: str | None = None, tags: tuple[str, ...] | None = None
+        self,
+        entry_id: int,
+        *,
+        notes: str | None = None,
+        tags: tuple[str, ...] | None = None,
+        base: Remarks | None = None,
     ) -> Entry:
         """Change notes or tags; None leaves them unchanged.
 
+        ``base``: what they were when the person began to change them.
+
         Raises:
-            NotInLibrary: no such entry. NotAllowed: too long or too many.
+            NotInLibrary: no such entry. NotAllowed: too long or too many. ChangedMeanwhile: another
+                person changed them.
         """
         if notes is not None and len(notes) > MAX_NOTES:
             raise NotAllowed("library.notes-too-long", limit=limits.signs(MAX_NOTES))
@@ -203,6 +213,9 @@ class Library:
             tags = _clean(tags)
         with self.store.writing() as session:
             item = self._item(session, entry_id)
+            if base is not None:
+                now = Remarks(item.notes, tuple(tag.tag for tag in item.tags))
+                require_unchanged(now, base, Remarks(notes, tags))
             if notes is not None:
                 item.notes = notes
             if tags is not None:

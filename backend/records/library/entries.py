@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Literal
 
+from drivers.errors import NotAllowed
+
 Kind = Literal["set", "recording", "measurement", "report"]
 KINDS: tuple[Kind, ...] = ("set", "recording", "measurement", "report")
 
@@ -15,6 +17,37 @@ Fact = int | float | str | bool | None
 MAX_TAGS = 20
 MAX_TAG = 60
 MAX_NOTES = 4000
+
+
+class ChangedMeanwhile(NotAllowed):
+    """Another person changed the notes or tags meanwhile; ``value`` is what they are now."""
+
+    kind = "changed-meanwhile"
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """Notes and tags, each None where it is not concerned."""
+
+    notes: str | None = None
+    tags: tuple[str, ...] | None = None
+
+
+def require_unchanged(now: Remarks, base: Remarks, wanted: Remarks) -> None:
+    """Check that nobody changed notes or tags since a person read them as ``base``.
+
+    A change to the same contents does no harm. A field without a base is not checked.
+
+    Raises:
+        ChangedMeanwhile: they are different now.
+    """
+    if None not in (base.notes, wanted.notes) and now.notes not in (base.notes, wanted.notes):
+        raise ChangedMeanwhile("library.notes-changed", parameter="notes", value=now.notes)
+    if base.tags is None or wanted.tags is None or now.tags is None:
+        return
+    if set(now.tags) not in (set(base.tags), set(wanted.tags)):
+        tags = ", ".join(now.tags)
+        raise ChangedMeanwhile("library.tags-changed", parameter="tags", value=tags)
 
 
 @dataclass(frozen=True, slots=True)

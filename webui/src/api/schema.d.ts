@@ -4780,6 +4780,16 @@ export interface components {
          * @description Remarks on a recording; values that are left out stay unchanged.
          */
         ChangeRecording: {
+            /**
+             * Base Notes
+             * @description the notes that were changed; refused where they are different by now
+             */
+            base_notes?: string | null;
+            /**
+             * Base Tags
+             * @description the tags that were changed, in the same way
+             */
+            base_tags?: string[] | null;
             /** Kept */
             kept?: boolean | null;
             /** Notes */
@@ -8874,6 +8884,16 @@ export interface components {
          * @description Change notes or tags; values that are left out stay unchanged.
          */
         LibraryChange: {
+            /**
+             * Base Notes
+             * @description the notes that were changed; refused where they are different by now
+             */
+            base_notes?: string | null;
+            /**
+             * Base Tags
+             * @description the tags that were changed, in the same way
+             */
+            base_tags?: string[] | null;
             /**
              * Deleted
              * @description false restores it

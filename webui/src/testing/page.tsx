@@ -114,6 +114,8 @@ Object.assign(globalThis, {
   Path2D: surface,
   IS_REACT_ACT_ENVIRONMENT: true,
 })
+// Text fields that grow measure again when fonts have come.
+Object.defineProperty(document, 'fonts', { value: new EventTarget() })
 HTMLCanvasElement.prototype.getContext = surface as never
 afterEach(cleanup)
 // What a form waits for until it asks takes longer on a busy machine.

@@ -28,6 +28,8 @@ library_no-version = { $item } has no version { $value }
     .remedy = choose one of its versions
 library_not-shared-contents-recording = { $value } is not shared contents of a recording, measurement or report
     .remedy = share it on its station first
+library_notes-changed = the notes were changed meanwhile: they are now { QUOTED($value) }
+    .remedy = compare both texts, and write what shall stand there
 library_notes-too-long = the notes are too long
     .remedy = shorten the notes
 library_too-large-library = { $entry } is too large for the library
@@ -44,3 +46,5 @@ library_saved-from = it was saved from { $what ->
        *[firmware] firmware
     } { $theirs }, this drive has { $ours }
 library_set-cannot-be-read = { $name } cannot be read: { $cause }
+library_tags-changed = the tags were changed meanwhile: they are now { QUOTED($value) }
+    .remedy = compare both, and write those that shall stand there

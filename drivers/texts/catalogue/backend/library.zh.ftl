@@ -28,6 +28,8 @@ library_no-version = { $item } 没有版本 { $value }
     .remedy = 请选择其版本之一
 library_not-shared-contents-recording = { $value } 不是录制、测量或报告的共享内容
     .remedy = 请先在其站点共享
+library_notes-changed = 备注在此期间已被修改：现为 { QUOTED($value) }
+    .remedy = 请比较两个文本，并写入应保留的内容
 library_notes-too-long = 备注过长
     .remedy = 请缩短备注
 library_too-large-library = { $entry } 对库而言过大
@@ -44,3 +46,5 @@ library_saved-from = 保存时驱动器的{ $what ->
        *[firmware] 固件
     }为 { $theirs }，此驱动器为 { $ours }
 library_set-cannot-be-read = 无法读取 { $name }：{ $cause }
+library_tags-changed = 标签在此期间已被修改：现为 { QUOTED($value) }
+    .remedy = 请比较两者，并写入应保留的标签

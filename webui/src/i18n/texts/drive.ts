@@ -64,6 +64,7 @@ export const drive = {
   'problemTitle.bad-description': ['Not a usable description', '描述文件不可用'],
   'problemTitle.bad-parameter-set': ['Not a usable parameter set', '参数集不可用'],
   'problemTitle.bad-recording': ['Not a usable recording', '录制不可用'],
+  'problemTitle.changed-meanwhile': ['Changed meanwhile', '已被他人修改'],
   'problemTitle.bad-snapshot': ['Not a usable snapshot', '快照不可用'],
   'problemTitle.storage-failed': ['Could not be stored', '无法存储'],
   'problemTitle.restore-failed': ['Not everything was restored', '未能全部恢复'],

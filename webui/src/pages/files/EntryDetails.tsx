@@ -4,8 +4,10 @@ import { api, ask } from '../../api/client'
 import type { LibraryEntry, VersionInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/numbers/format'
+import { ChangedMeanwhile } from '../../widgets/ChangedMeanwhile'
 import { ProblemNote } from '../../widgets/ProblemNote'
 import { useAction } from '../../widgets/useAction'
+import { useRemarks } from '../../widgets/useRemarks'
 import { contentUrl } from './LibraryRow'
 
 /** Folded away: all versions of an entry, its tags and its notes. */
@@ -104,38 +106,40 @@ function Versions({
 
 function Remarks({ entry, onChanged }: { entry: LibraryEntry; onChanged: () => void }) {
   const t = useT()
-  const act = useAction()
-  const [notes, setNotes] = useState(entry.notes)
-  const [tags, setTags] = useState(entry.tags)
-  const save = () =>
-    act
-      .run(() =>
-        ask(
-          api.PATCH('/api/v1/library/{entry_id}', {
-            params: { path: { entry_id: entry.id } },
-            body: { notes, tags },
-          }),
-        ),
-      )
-      .then((done) => done && onChanged())
+  const remarks = useRemarks(entry, (change) =>
+    ask(
+      api.PATCH('/api/v1/library/{entry_id}', {
+        params: { path: { entry_id: entry.id } },
+        body: change,
+      }),
+    ),
+  )
+  const done = (saved: boolean) => saved && onChanged()
   return (
     <>
       <TagsInput
         label={t('library.tags')}
-        value={tags}
+        value={remarks.tags}
         maxTags={20}
-        onChange={(next) => setTags(next.map((tag) => tag.slice(0, 60)))}
+        onChange={(next) => remarks.change({ tags: next.map((tag) => tag.slice(0, 60)) })}
       />
       <Textarea
         label={t('library.notes')}
-        value={notes}
+        value={remarks.notes}
         maxLength={4000}
         autosize
-        onChange={(event) => setNotes(event.currentTarget.value)}
+        onChange={(event) => remarks.change({ notes: event.currentTarget.value })}
       />
-      <ProblemNote problem={act.problem} onClose={act.clear} />
+      <ChangedMeanwhile
+        problem={remarks.act.problem}
+        mine={remarks}
+        busy={remarks.act.busy}
+        onTake={remarks.take}
+        onOverwrite={(field, theirs) => void remarks.overwrite(field, theirs).then(done)}
+        onClose={remarks.act.clear}
+      />
       <div className="row end">
-        <Button loading={act.busy} onClick={() => void save()}>
+        <Button loading={remarks.act.busy} onClick={() => void remarks.save().then(done)}>
           {t('library.saveRemarks')}
         </Button>
       </div>

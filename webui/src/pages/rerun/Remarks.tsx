@@ -3,8 +3,8 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { RecordingInfo } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { ChangedMeanwhile } from '../../widgets/ChangedMeanwhile'
+import { useRemarks } from '../../widgets/useRemarks'
 
 /** Notes, tags, and whether a stored recording is kept for ever. */
 export function Remarks({
@@ -15,23 +15,36 @@ export function Remarks({
   onChanged: () => void
 }) {
   const t = useT()
-  const act = useAction()
-  const [notes, setNotes] = useState(recording.notes)
-  const [tags, setTags] = useState(recording.tags)
   const [kept, setKept] = useState(recording.kept)
   const path = { params: { path: { name: recording.name } } }
+  const remarks = useRemarks(recording, (change) =>
+    ask(api.PATCH('/api/v1/recordings/{name}', { ...path, body: { ...change, kept } })),
+  )
+  const done = (saved: boolean) => saved && onChanged()
   return (
     <details className="remarks">
       <summary>{t('recordings.remarks')}</summary>
-      <ProblemNote problem={act.problem} onClose={act.clear} />
+      <ChangedMeanwhile
+        problem={remarks.act.problem}
+        mine={remarks}
+        busy={remarks.act.busy}
+        onTake={remarks.take}
+        onOverwrite={(field, theirs) => void remarks.overwrite(field, theirs).then(done)}
+        onClose={remarks.act.clear}
+      />
       <Textarea
         label={t('recordings.notes')}
-        value={notes}
+        value={remarks.notes}
         maxLength={4000}
         autosize
-        onChange={(event) => setNotes(event.currentTarget.value)}
+        onChange={(event) => remarks.change({ notes: event.currentTarget.value })}
       />
-      <TagsInput label={t('recordings.tags')} value={tags} maxTags={20} onChange={setTags} />
+      <TagsInput
+        label={t('recordings.tags')}
+        value={remarks.tags}
+        maxTags={20}
+        onChange={(tags) => remarks.change({ tags })}
+      />
       <div className="row wrap middle">
         <Checkbox
           className="grow"
@@ -39,18 +52,7 @@ export function Remarks({
           checked={kept}
           onChange={(event) => setKept(event.currentTarget.checked)}
         />
-        <Button
-          loading={act.busy}
-          onClick={() =>
-            void act
-              .run(() =>
-                ask(
-                  api.PATCH('/api/v1/recordings/{name}', { ...path, body: { notes, tags, kept } }),
-                ),
-              )
-              .then(onChanged)
-          }
-        >
+        <Button loading={remarks.act.busy} onClick={() => void remarks.save().then(done)}>
           {t('recordings.saveRemarks')}
         </Button>
       </div>
