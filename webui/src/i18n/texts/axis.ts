@@ -100,6 +100,10 @@ export const axis = {
   'motion.acceleration': ['Acceleration', '加速度'],
   'motion.travelLimit': ['Travel limit', '行程限值'],
   'motion.torqueLimit': ['Torque limit', '转矩限值'],
+  'motion.moves': [
+    'WARNING: the axis is enabled and moves by itself, at most {travel} {unit} from its present position, with at most {torque} % of rated torque. Keep everyone clear of the machine.',
+    '警告：轴将使能并自行运动，从当前位置起最多 {travel} {unit}，最大 {torque}% 额定转矩。请确保无人靠近机器。',
+  ],
   'motion.state': ['State:', '状态：'],
   'motion.enable': ['Enable', '使能'],
   'motion.disable': ['Disable', '断使能'],

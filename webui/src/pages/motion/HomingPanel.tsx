@@ -13,7 +13,7 @@ import { useSay } from '../../widgets/profile-text/texts'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/jobs/useObstacle'
 import { useWrong } from '../../widgets/numbers/useWrong'
-import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
+import { Acceleration, MovesByItself, Speed, TorqueLimit, TravelLimit } from './fields'
 import { HomingPicture } from './HomingPicture'
 import { useRemembered } from './remembered'
 import { placeIn, startIn, type TravelUnit } from './travelUnit'
@@ -158,6 +158,7 @@ export function HomingPanel({
         />
       </div>
       <p className="dim">{t('homing.empty')}</p>
+      <MovesByItself {...{ units, travel, torque }} />
       <StartButton
         obstacle={obstacle ?? (complete ? null : t('start.incomplete'))}
         busy={start.busy}

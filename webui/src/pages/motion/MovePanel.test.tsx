@@ -63,3 +63,14 @@ it('asks only for the numbers that the shape of a signal has', async () => {
   expect(start.getAttribute('aria-disabled')).toBe('false')
   await settled()
 })
+
+it.each([
+  ['a move', MovePanel],
+  ['a test signal', SignalPanel],
+])('warns of %s next to its start, also while a limit is typed', async (_, panel) => {
+  await opened(panel)
+  const warning = () => screen.getByText(/^WARNING: the axis is enabled/).textContent
+  expect(warning()).toMatch(/at most \d+ rev .* at most \d+ % of rated torque/)
+  await userEvent.clear(field('Travel limit'))
+  expect(warning()).toContain('at most … rev')
+})

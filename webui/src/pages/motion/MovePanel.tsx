@@ -10,7 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/jobs/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/jobs/useObstacle'
-import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
+import { Acceleration, MovesByItself, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
 import type { TravelUnit } from './travelUnit'
 import { useMotionNumbers } from './useMotionNumbers'
@@ -142,6 +142,7 @@ export function MovePanel({
           />
         </div>
       )}
+      <MovesByItself {...{ units, travel, torque }} />
       <StartButton
         obstacle={
           obstacle ??

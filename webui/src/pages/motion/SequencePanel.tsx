@@ -10,7 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/jobs/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/jobs/useObstacle'
-import { Acceleration, Speed, TorqueLimit, TravelLimit } from './fields'
+import { Acceleration, MovesByItself, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useRemembered } from './remembered'
 import type { TravelUnit } from './travelUnit'
 import { useMotionNumbers } from './useMotionNumbers'
@@ -127,6 +127,7 @@ export function SequencePanel({
         <TravelLimit units={units} {...numbers.travel} />
         <TorqueLimit {...numbers.torque} />
       </div>
+      <MovesByItself {...{ units, travel, torque }} />
       <StartButton
         obstacle={obstacle ?? (values.includes(null) ? t('start.incomplete') : null)}
         busy={start.busy}

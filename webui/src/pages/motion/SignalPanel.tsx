@@ -10,7 +10,7 @@ import { ProblemNote } from '../../widgets/ProblemNote'
 import { StartButton } from '../../widgets/jobs/StartButton'
 import { useAction } from '../../widgets/useAction'
 import { useObstacle } from '../../widgets/jobs/useObstacle'
-import { Speed, TorqueLimit, TravelLimit } from './fields'
+import { MovesByItself, Speed, TorqueLimit, TravelLimit } from './fields'
 import { useBuses } from '../../live/buses'
 import { useRemembered } from './remembered'
 import { placeIn, startIn, type TravelUnit } from './travelUnit'
@@ -198,6 +198,7 @@ export function SignalPanel({
         <Speed units={units} label={t('move.speedLimit')} value={speed} onChange={setSpeed} />
         <TorqueLimit value={torque} onChange={setTorque} />
       </div>
+      <MovesByItself {...{ units, travel, torque }} />
       <StartButton
         obstacle={
           obstacle ??

@@ -50,3 +50,26 @@ export function Acceleration({ units, ...field }: Field) {
     />
   )
 }
+
+/** What will move, within the limits that are typed: next to every button that starts it. */
+export function MovesByItself({
+  units,
+  travel,
+  torque,
+}: {
+  units: Units
+  travel: number | null
+  torque: number | null
+}) {
+  const t = useT()
+  // A field that is being typed in moves nothing below it.
+  return (
+    <p className="note warn">
+      {t('motion.moves', {
+        travel: travel ?? '…',
+        unit: units.position ?? '',
+        torque: torque ?? '…',
+      })}
+    </p>
+  )
+}
