@@ -3,11 +3,13 @@ import { useCallback, useEffect, useState } from 'react'
 import { API_ROOT, api, ask, problemOf } from '../../api/client'
 import type { Problem, ReportInfo, ReportRequest } from '../../api/schema'
 import { useLanguage, useT } from '../../i18n'
+import { useDrive } from '../../live/store'
 import { ConfirmDelete } from '../../widgets/ConfirmDelete'
 import { dateTime } from '../../widgets/numbers/format'
 import { Icon } from '../../widgets/Icon'
 import { Panel } from '../../widgets/Panel'
 import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProcedureButton } from '../../widgets/faults/Procedures'
 import { useAction } from '../../widgets/useAction'
 
 const FORMATS = ['pdf', 'html'] as const
@@ -37,6 +39,7 @@ export function useReports() {
 export function ReportPanel({ drive, of }: { drive: string; of: ReturnType<typeof useReports> }) {
   const t = useT()
   const shown = useLanguage()
+  const unsaved = useDrive(drive)?.unsaved ?? 0
   const [format, setFormat] = useState<ReportRequest['format']>('pdf')
   const [language, setLanguage] = useState<ReportRequest['language']>(shown)
   const [person, setPerson] = useRememberedText('report.person')
@@ -101,6 +104,11 @@ export function ReportPanel({ drive, of }: { drive: string; of: ReturnType<typeo
         <Button variant="filled" loading={make.busy} onClick={() => void go()}>
           {t('report.make')}
         </Button>
+        <ProcedureButton
+          drive={drive}
+          name="save"
+          label={unsaved > 0 ? t('parameters.saveCount', { count: unsaved }) : t('parameters.save')}
+        />
       </div>
       <ProblemNote problem={make.problem ?? remove.problem ?? of.problem} onClose={make.clear} />
       <ul className="plain-list scroll-list">

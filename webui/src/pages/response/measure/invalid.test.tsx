@@ -138,10 +138,10 @@ describe('a number that may be left out', () => {
     const tuning = await shown(
       <AutotunePanel {...MEASURED} state={STATE} now={null} onChanged={() => {}} />,
     )
-    await refusesWhileInvalid('Motor alone', 'Start tuning', '/jobs/autotune', '0.001')
+    await refusesWhileInvalid('Motor inertia', 'Start tuning', '/jobs/autotune', '0.001')
     tuning.unmount()
     await shown(<InertiaPanel {...MEASURED} state={STATE} />)
-    await refusesWhileInvalid('Motor alone', 'Measure the inertia', '/jobs/inertia', '0.001')
+    await refusesWhileInvalid('Motor inertia', 'Measure the inertia', '/jobs/inertia', '0.001')
   })
 })
 

@@ -3,6 +3,7 @@ import { useMemo, useState } from 'react'
 import { api, ask } from '../../../api/client'
 import { known, useSay, useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/ProblemNote'
+import { ProcedureButton } from '../../../widgets/faults/Procedures'
 import { useAction } from '../../../widgets/useAction'
 import { changedSince, noteUndone } from '../../response/design/undo'
 import { hertz, measuredCurve, wrapWhole } from '../../response/plot/bode'
@@ -73,7 +74,12 @@ export function AutotuneReport({
               </Button>
             )}
           </div>
-          {force === 'acts' && <p>{t('autotune.save')}</p>}
+          {force === 'acts' && (
+            <div className="row wrap middle">
+              <span className="grow">{t('autotune.save')}</span>
+              <ProcedureButton drive={drive} name="save" label={t('parameters.save')} />
+            </div>
+          )}
         </div>
       )}
       <ProblemNote problem={undo.problem} onClose={undo.clear} />
