@@ -30,10 +30,12 @@ export function FilesPage() {
   const [handing, setHanding] = useState<LibraryEntry | null>(null)
   const handOver = (entry: LibraryEntry) => {
     setHanding(entry)
+    setComparing(null)
     toTop()
   }
   const compare = (entry: LibraryEntry, version?: number) => {
     setComparing({ entry, version: version ?? null })
+    setHanding(null)
     toTop()
   }
   return (

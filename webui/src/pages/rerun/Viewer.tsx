@@ -11,6 +11,8 @@ export function Viewer({ recording }: { recording: string | null }) {
   const frame = useRef<HTMLIFrameElement>(null)
   const [state, setState] = useViewer()
   useEffect(() => setState(LOADING), [recording, setState])
+  // The button of a recording is in the list above, often out of sight from here.
+  useEffect(() => frame.current?.scrollIntoView({ block: 'nearest' }), [recording])
   const words = {
     loading: t('rerun.loading', { percent: Math.round(state.fraction * 100) }),
     started: t('rerun.started'),

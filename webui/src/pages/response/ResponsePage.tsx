@@ -36,6 +36,7 @@ export function ResponsePage({ drive }: { drive: string }) {
   const { content, sweep, problem } = useSweep(shown)
   const other = useSweep(over)
   const opened = useRef('')
+  const picture = useRef<HTMLDivElement>(null)
   useEffect(() => {
     // Once for each axis: what is measured elsewhere later takes nobody's picture away.
     if (!summary || !measured.asked || opened.current === drive) return
@@ -76,19 +77,24 @@ export function ResponsePage({ drive }: { drive: string }) {
             onShow={(file) => {
               setShown(file)
               if (file === over) setOver(null)
+              bringIntoSight(picture.current)
             }}
-            onOver={setOver}
+            onOver={(file) => {
+              setOver(file)
+              if (file !== null) bringIntoSight(picture.current)
+            }}
             onChange={measured.refresh}
           />
           <ImportPanel
             onStored={(file) => {
               if (shown !== null) setOver(shown)
               setShown(file)
+              bringIntoSight(picture.current)
               void measured.refresh()
             }}
           />
         </div>
-        <div className="stack">
+        <div className="stack" ref={picture}>
           <ProblemNote problem={problem ?? other.problem} />
           {shown === null && !problem && <p className="panel empty">{t('response.empty')}</p>}
           {shown !== null && !content && !problem && <p className="panel empty">{t('loading')}</p>}
@@ -130,6 +136,12 @@ export function ResponsePage({ drive }: { drive: string }) {
       </div>
     </div>
   )
+}
+
+/** After a press: where the columns are one below the other, the plot is far from the button. */
+function bringIntoSight(column: HTMLElement | null): void {
+  const top = column?.getBoundingClientRect().top ?? 0
+  if (top < 0 || top > window.innerHeight / 2) column?.scrollIntoView({ block: 'start' })
 }
 
 /** The newest usable response of this axis; the list is newest first. */
