@@ -94,7 +94,10 @@ export const frame = {
   'frame.bench': ['Bench', '调试台'],
   'frame.noAxes': ['No axis yet. Start with Connect.', '尚无轴，请先连接。'],
   'frame.noAxis': ['No axis', '无轴'],
-  'frame.noSuchAxis': ['This axis is not on the bench.', '调试台上没有此轴。'],
+  'frame.noSuchAxis': [
+    'This axis is not on the bench. Choose another one, or start with Connect.',
+    '调试台上没有此轴。请选择其他轴，或先连接。',
+  ],
   'frame.state': ['State of the drive', '驱动器状态'],
   'frame.linkHelp': ['Link quality; details on the Connect page', '链路质量，详见连接页面'],
   'frame.preferences': ['Appearance', '外观'],

@@ -97,7 +97,7 @@ export const functions = {
     'The place of each parameter in the loops. Written values take effect at once or as noted; they are not saved in the drive.',
     '各参数在控制环中的位置。写入后立即或按说明生效，但不会保存到驱动器。',
   ],
-  'gains.toTune': ['To the guided tuning', '前往引导调试'],
+  'gains.toTune': ['Open the page Tune', '前往“整定”页面'],
   'gains.toPage': ['All gains, filters and switching', '全部增益、滤波与切换'],
   'gains.none': ['The profile contains no gains of this drive.', '配置文件不含此驱动器的增益。'],
   'gains.otherPort': [
@@ -156,7 +156,7 @@ export const functions = {
   ],
   'blockHelp.notch': [
     'Suppress narrow resonances. Place them on the Response page, from a measurement.',
-    '抑制窄带谐振。请在响应页面根据测量设置。',
+    '抑制窄带谐振。请在“频率响应”页面根据测量设置。',
   ],
   'blockHelp.adaptive': [
     'The drive places notches automatically while the axis moves.',

@@ -83,7 +83,7 @@ export const health = {
   'health.permittedBy': ['Permitted by', '许可人'],
   'health.trigger': ['A controller may request a run', '控制器可请求运行'],
   'health.warning': [
-    'WARNING. The axis moves at these times without anybody pressing a button, within the limits of the baseline. Guards and their interlocks must keep everybody out of the danger zone.',
+    'WARNING: the axis moves at these times without anybody pressing a button, within the limits of the baseline. Guards and their interlocks must keep everybody out of the danger zone.',
     '警告：到了这些时间，无人按下按钮，轴也会在基线限值内运动。防护装置及其联锁必须确保危险区域内无人。',
   ],
   'health.secured': [
@@ -92,7 +92,10 @@ export const health = {
   ],
   'health.permit': ['Permit', '许可'],
   'health.stations': ['All axes of the database, of every station', '数据库中所有站点的所有轴'],
-  'health.noneStored': ['No health check is stored yet.', '尚未存储健康检查。'],
+  'health.noneStored': [
+    'No health check is stored yet. Measure a baseline above.',
+    '尚未存储健康检查。请在上方测量基线。',
+  ],
   'health.axis': ['Axis', '轴'],
   'health.station': ['Station', '站点'],
   'health.newest': ['Newest round', '最新一轮'],

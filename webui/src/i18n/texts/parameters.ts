@@ -105,8 +105,8 @@ export const parameters = {
     'Can energise the motor: it cannot be written in this table.',
     '可能使电机得电：不能在此表中写入。',
   ],
-  'motion.goMotion': ['Open the Motion page', '打开运动页面'],
-  'motion.goIo': ['Open the I/O page', '打开 I/O 页面'],
+  'motion.goMotion': ['Open the Motion page', '打开“运动”页面'],
+  'motion.goIo': ['Open the I/O page', '打开“输入输出”页面'],
   'motion.procedure': ['Instead: {how}.', '请改为：{how}。'],
   'motion.set': ['Set with permission…', '凭许可设置…'],
   'motion.noRight': [

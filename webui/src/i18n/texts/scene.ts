@@ -9,7 +9,7 @@ export const scene = {
     '部件随实测位置运动。每个电机上方为轴名、状态和位置。I：有转矩，O：无转矩，!：有故障，?：未知。红柱为驱动器软件限位，蓝柱为位置 0。拖动可旋转，滚轮或双指可缩放。无限位的导轨按轴到达过的范围伸长，长度不按比例。',
   ],
   'scene.states': ['States of the axes', '各轴状态'],
-  'scene.none': ['No axis is connected yet.', '尚未连接任何轴。'],
+  'scene.none': ['No axis is connected yet. Start with Connect.', '尚未连接任何轴，请先连接。'],
   'scene.shaft': ['a bare shaft', '裸轴（无负载）'],
   'scene.screw': ['a screw', '丝杠'],
   'scene.belt': ['a belt', '皮带'],

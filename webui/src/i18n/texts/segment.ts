@@ -49,15 +49,15 @@ export const segment = {
   'segment.port': ['Port', '端口'],
   'segment.link': ['Link', '连接'],
   'segment.linkUp': ['connected', '已连接'],
-  'segment.linkDown': ['open', '未连接'],
+  'segment.linkDown': ['not connected', '未连接'],
   'segment.lostLinks': ['Link losses', '断开次数'],
   'segment.rxErrors': ['RX errors', '接收错误'],
   'segment.invalidFrames': ['Damaged frames', '损坏帧'],
   'segment.forwarded': ['Forwarded RX errors', '转发的接收错误'],
   'segment.writeAlias': ['Write alias', '写入别名'],
   'segment.aliasWarning': [
-    'The alias is written to the drive’s EEPROM and takes effect after a power cycle. If a controller addresses drives by alias, change it there as well. Nothing may move on this bus meanwhile.',
-    '写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
+    'NOTICE: the alias is written to the drive’s EEPROM and takes effect after a power cycle. If a controller addresses drives by alias, change it there as well. Nothing may move on this bus meanwhile.',
+    '注意：写入驱动器 EEPROM，断电重启后生效。若控制器按别名寻址，需同步修改。写入期间此总线上不得有运动。',
   ],
   'segment.eeprom': ['EEPROM', 'EEPROM 存储器'],
   'segment.eepromWhat': [
