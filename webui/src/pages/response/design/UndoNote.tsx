@@ -2,8 +2,10 @@ import { Button } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../../api/client'
 import { useT } from '../../../i18n'
-import { dateTime } from '../../../widgets/numbers/format'
+import { dateTime, shown, toValue } from '../../../widgets/numbers/format'
 import { ProblemNote } from '../../../widgets/ProblemNote'
+import { useRows } from '../../../widgets/profile-text/rows'
+import type { Raw } from '../../../widgets/types'
 import { useAction } from '../../../widgets/useAction'
 import { changedSince, forget, noteForeign, noteUndone, useChanges, useForeign } from './undo'
 
@@ -59,16 +61,31 @@ export function UndoNote({ drive, onUndone }: { drive: string; onUndone: () => v
       </div>
       <details>
         <summary>{t('undo.what', { count: Object.keys(last.before).length })}</summary>
-        <dl className="facts mono">
-          {Object.entries(last.before).map(([key, raw]) => (
-            <div key={key} className="pair">
-              <dt>{key}</dt>
-              <dd>{raw}</dd>
-            </div>
-          ))}
-        </dl>
+        <Before drive={drive} values={last.before} />
       </details>
       <ProblemNote problem={act.problem} onClose={act.clear} />
     </div>
+  )
+}
+
+/** The values that an undo writes, by the names and in the units of the parameters. */
+function Before({ drive, values }: { drive: string; values: Record<string, Raw> }) {
+  const rows = new Map((useRows(drive) ?? []).map((row) => [row.key, row]))
+  return (
+    <dl className="facts">
+      {Object.entries(values).map(([key, raw]) => {
+        const row = rows.get(key)
+        return (
+          <div key={key} className="pair">
+            <dt>
+              <span className="mono dim">{row?.number ?? key}</span> {row?.name}
+            </dt>
+            <dd className="num">
+              {row ? shown(row, toValue(row, raw), raw) : raw} {row?.unit}
+            </dd>
+          </div>
+        )
+      })}
+    </dl>
   )
 }

@@ -66,6 +66,21 @@ describe('an undo', () => {
     await shown(<Note />)
     expect(changes.map((each) => each.what)).toEqual(['gains', 'notches', 'candidate'])
   })
+
+  it('lists what it writes by name, in the unit of the parameter', async () => {
+    const row = {
+      key: '2005:03', name: 'Speed loop bandwidth', number: null, group: '', type: 'UINT16',
+      access: 'rw', unit: 'Hz', scale: 0.1, offset: 0, enum: {}, bits: {},
+      reading: { key: '2005:03', raw: 200, value: 20, time: null },
+    } // prettier-ignore
+    setRows(drive, [row as unknown as ParameterRow])
+    remember(drive, 'gains', { before: { '2005:03': 1500, '2005:09': 7 } })
+    await shown(<Note />)
+    const of = (name: string) =>
+      [...document.querySelectorAll(name)].map((each) => each.textContent?.trim())
+    expect(of('dt')).toEqual(['2005:03 Speed loop bandwidth', '2005:09'])
+    expect(of('dd')).toEqual(['150 Hz', '7'])
+  })
 })
 
 describe('changes of another drive that had the id before', () => {
