@@ -136,7 +136,13 @@ def _axis(axis: dict[str, Any], say: _Words) -> str:
     )
     apart = ("parameters", "state", "past_faults")
     identity = {k: v for k, v in axis.items() if k not in apart}
-    values = {k: v for k, v in state.items() if k != "faults"}
+    units = state.get("units", {})
+    values = {k: v for k, v in state.items() if k not in ("faults", "units")}
+    values["values"] = {
+        name: f"{value:g} {units.get(name, '')}".strip()
+        for name, value in state.get("values", {}).items()
+        if value is not None
+    }
     name = f"parameters/{axis['drive']}.csv"
     count = text("bundle.parameters", count=len(axis["parameters"]))
     no_fault = f"<p>{say(text('bundle.no-fault'))}</p>"
@@ -227,18 +233,24 @@ _NAMES: dict[str, Text] = {
     "title": text("bundle.name-title"),
     "transactions": text("bundle.name-transactions"),
     "turning": text("bundle.name-turning"),
-    "units": text("bundle.name-units"),
     "url": text("bundle.name-url"),
     "values": text("bundle.name-values"),
+    "position": text("bundle.name-position"),
+    "velocity": text("bundle.name-velocity"),
+    "torque": text("bundle.name-torque"),
+    "following_error": text("bundle.name-following-error"),
+    "dc_voltage": text("bundle.name-dc-voltage"),
+    "temperature": text("bundle.name-temperature"),
     "wkc_errors": text("bundle.name-wkc-errors"),
 }
 
 
 def _pairs(content: dict[str, Any], say: _Words) -> str:
     rows = "".join(
-        f"<tr><th>{_named(name, say)}<td>{_shown(name, value, say)}"
+        f"<tr><th>{_named(name, say)}<td>{shown}"
         for name, value in in_language(content, say.language).items()
         if not name.endswith(("_message", "_messages"))
+        if (shown := _shown(name, value, say))
     )
     return f"<table>{rows}</table>"
 
@@ -254,6 +266,8 @@ def _shown(name: str, value: object, say: _Words) -> str:
         return _e(when(value))
     if isinstance(value, bool):
         return _e(say.yes_or_no(value))
+    if name == "status_word" and isinstance(value, int):
+        return f"0x{value:04X}"
     if isinstance(value, Mapping):
         entries = ((str(each), value[each]) for each in value)
         return ", ".join(f"{_named(k, say)} {_shown(k, v, say)}" for k, v in entries)

@@ -79,6 +79,9 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
         "state": {
             **sentence("state", state_text(State.FAULT)),
             "fresh": True,
+            "status_word": 0x218,
+            "values": {"dc_voltage": 310.5, "torque": None},
+            "units": {"dc_voltage": "V"},
             "faults": [{"kind": "fault", "code": OVER_VOLTAGE.code, "name": OVER_VOLTAGE.name,
                         "causes": list(OVER_VOLTAGE.causes), "source": OVER_VOLTAGE.source,
                         "remedies": list(OVER_VOLTAGE.remedies)}],
@@ -150,6 +153,8 @@ def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
     assert "<th>状态<td>故障" in chinese
     assert "<th>数值为最新<td>是" in chinese
     assert "<th>超时<td>3" in chinese
+    assert "<th>状态字<td>0x0218" in chinese
+    assert "<th>数值<td>母线电压 310.5 V<" in chinese
     assert '<a href="index.html" lang="en">English</a>' in chinese
     for english in ("Causes", "Remedies", "Signals", "Files", "No ", "parameters<", "yes"):
         assert english not in chinese, english
