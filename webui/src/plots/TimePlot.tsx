@@ -214,7 +214,8 @@ function options(
           scale: name,
           ...named(name),
           stroke: ownColor(series, name) ?? look.stroke,
-          size: narrow ? 42 : 60,
+          // A sign and three figures, as −0.25. Fixed: the plot must not move with the numbers.
+          size: narrow ? 50 : 60,
           // eslint-disable-next-line @typescript-eslint/no-unsafe-enum-assignment -- see LEFT
           side: i % 2 === 0 ? LEFT : RIGHT,
           grid: { ...look.grid, show: i === 0 },

@@ -78,7 +78,6 @@ export function JogPanel({
   }
   return (
     <Panel title={t('jog.title')} className="jog-panel">
-      <p className="dim">{t('jog.help')}</p>
       <div className="fields">
         <Speed units={units} {...numbers.speed} disabled={running} />
         <Acceleration units={units} {...numbers.acceleration} disabled={running} />
@@ -128,6 +127,8 @@ export function JogPanel({
         />
       </div>
       <p className="dim keys-help">{t('jog.keys')}</p>
+      {/* Below the buttons, which a thumb must reach on a phone without scrolling. */}
+      <p className="dim">{t('jog.help')}</p>
       {taken && (
         // A jog that was let go needs a moment to brake and tidy up, on a slow bus a long one.
         <p className={ending ? 'dim' : 'warn-text'} role="status">
