@@ -206,6 +206,25 @@ def test_a_closed_loop_runs_away_over_a_wrong_motor(spec: MechanicsSpec, runs_aw
         assert fast == pytest.approx(5.0, rel=0.05)
 
 
+@pytest.mark.parametrize(
+    "spec",
+    [motor(), motor(PhaseSpec(order="shifted")), motor(inverted=True)],
+    ids=["right", "shifted", "inverted"],
+)
+def test_shorted_windings_brake_a_wrong_motor_too(spec: MechanicsSpec) -> None:
+    """Induced currents need neither the phase order of the drive nor an encoder."""
+    axis = VirtualAxis(spec)
+    axis.run_torque(0.2 * RATED_NM, math.inf)
+    for _ in range(20):
+        axis.run(10)
+    before = abs(float(axis._x[1]))
+    axis.power_off(dynamic_brake=True)
+    for _ in range(20):
+        axis.run(10)
+    assert before > 1.0
+    assert abs(float(axis._x[1])) < 0.3 * before
+
+
 def test_exchanged_phases_hold_the_rotor_at_a_multiple_of_half_an_electrical_turn() -> None:
     """A constant torque command of -T·cos(2pθ): it stops where the cosine is zero."""
     spec = motor(PhaseSpec(order="exchanged"))

@@ -48,8 +48,9 @@ def _let_go(p, s):  # type: ignore[no-untyped-def]
     s[k.S_INTEGRAL] = 0.0
     s[k.S_FF_SPEED] = 0.0
     s[k.S_FF_TORQUE] = 0.0
-    # Dynamic braking: the shorted windings brake in proportion to the speed.
-    s[k.S_TORQUE_COMMAND] = -p[k.P_DYNAMIC_BRAKE] * s[k.S_OMEGA]
+    # Dynamic braking: the shorted windings brake in proportion to the speed of the shaft, whichever
+    # way its encoder counts.
+    s[k.S_TORQUE_COMMAND] = -p[k.P_DYNAMIC_BRAKE] * p[k.P_ENCODER_SENSE] * s[k.S_OMEGA]
     s[k.S_SATURATED] = 0.0
     s[k.S_TORQUE_FILTERED] = 0.0
     s[k.S_SPEED_REFERENCE] = s[k.S_OMEGA]

@@ -107,7 +107,8 @@ def _elastic(p):  # type: ignore[no-untyped-def]
 def opposing(p, s, x):  # type: ignore[no-untyped-def]
     """Return the motor's torque demand besides its load: ripple, wrong phases, elastic brake."""
     torque = _ripple(p, x[0])
-    if p[k.P_PHASES_WRONG] > 0.0:
+    # Shorted windings brake without commutation, so that it cannot be wrong.
+    if p[k.P_PHASES_WRONG] > 0.0 and int(p[k.P_LOOP]) != k.LOOP_OFF:
         torque += (1.0 - _torque_share(p, x[0])) * x[2]
     if _gripped(p) and _elastic(p):
         torque += _grip(p, s, x[0], x[1])
