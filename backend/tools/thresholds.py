@@ -355,6 +355,10 @@ class first_power_run:
     CUT_REV = 0.012
     """[rev] A pulse that has moved the shaft so far is over: what is left is what it coasts.
     Origin: 8b39c64c."""
+    CUT_RPM = 30.0
+    """[rpm] The same for its speed: with break-away friction of 0.08 of rated torque, and hardly
+    any at speed, a bare rotor of 25 000 rad/s² at rated torque still coasts less than 0.1 rev.
+    Origin: 28 November 2026, `tests/virtual/tools/test_first_power.py`."""
     MOST_PULSES = 60
     """[count] Most pulses of one check. Origin: 8b39c64c."""
     # SETTLES_S, SETTLE_LOOK_S: Longest wait for standstill after a pulse, and how often the

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
@@ -133,6 +134,14 @@ def covered_pole_pairs(travel_rev: float) -> int:
     return math.ceil(1.0 / (4.0 * GOAL * travel_rev))
 
 
+def fits_again(pulse: Pulse, travel_rev: float) -> bool:
+    """Whether another motion as by this pulse, from where it ended, stays within the travel."""
+    moved = pulse.to_rev - pulse.from_rev
+    return abs(moved) <= STILL_REV or abs(pulse.to_rev + moved) <= max(
+        travel_rev, abs(pulse.from_rev)
+    )
+
+
 def way_of(pulses: Sequence[Pulse], goal_rev: float, cap_percent: float) -> Way:
     """Motion of the shaft for one sign of the torque; ``cap_percent`` is the highest pulse."""
     if not pulses:
@@ -141,17 +150,29 @@ def way_of(pulses: Sequence[Pulse], goal_rev: float, cap_percent: float) -> Way:
     if abs(went) >= 0.9 * goal_rev:
         return "with" if went > 0 else "against"
     last = pulses[-1]
-    if last.torque_percent < 0.95 * cap_percent:
+    if last.torque_percent < 0.95 * cap_percent or not fits_again(last, goal_rev / GOAL):
         return "short"
     moved = any(abs(each.to_rev - each.from_rev) > threshold.SOME * goal_rev for each in pulses)
     return "locked" if moved else "none"
 
 
+def ended_for_room(pulses: Sequence[Pulse], settings: FirstPowerSettings) -> bool:
+    """Whether the first direction ended before its goal because the travel had no more room."""
+    run = _newest_run(pulses, _WAYS[0])
+    if not run or fits_again(run[-1], settings.travel_limit):
+        return False
+    return abs(run[-1].to_rev - run[0].from_rev) < 0.9 * GOAL * settings.travel_limit
+
+
+def _newest_run(pulses: Sequence[Pulse], way: Literal[1, -1]) -> list[Pulse]:
+    """Pulses of a direction that followed one another, of the last time that it was made."""
+    runs = [list(run) for sign, run in groupby(pulses, lambda each: each.direction) if sign == way]
+    return runs[-1] if runs else []
+
+
 def _way_of(pulses: Sequence[Pulse], settings: FirstPowerSettings) -> tuple[Way, Way]:
     goal, cap = GOAL * settings.travel_limit, strongest(settings)
-    first, second = (
-        way_of([each for each in pulses if each.direction == way], goal, cap) for way in _WAYS
-    )
+    first, second = (way_of(_newest_run(pulses, way), goal, cap) for way in _WAYS)
     return first, second
 
 

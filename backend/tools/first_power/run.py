@@ -29,8 +29,10 @@ from backend.tools.first_power.evaluate import (
     Seen,
     arrays_of,
     counts_sound,
+    ended_for_room,
     evaluate,
     facts_of,
+    fits_again,
     reevaluate,
     strongest,
     supply_sound,
@@ -228,6 +230,9 @@ async def _energised(run: Run, settings: FirstPowerSettings, pulses: list[Pulse]
         test = _Test(run, settings, units, start, limits, facts.rated_torque_nm, pulses)
         for direction in _WAYS:
             await test.direction(direction)
+        # Backwards it has made room, where one pulse took it far.
+        if ended_for_room(pulses, settings):
+            await test.direction(_WAYS[0])
 
 
 class _Test:
@@ -247,8 +252,9 @@ class _Test:
     async def direction(self, direction: Literal[1, -1]) -> None:
         """Make pulses of one sign until the shaft has moved far enough or the strongest fails.
 
-        A pulse that moves the shaft by more than `threshold.CUT_REV` is cut off by the cyclic loop,
-        which removes the power: the axis is enabled again for the next pulse.
+        A pulse that moves the shaft by more than `threshold.CUT_REV`, or makes it faster than
+        `threshold.CUT_RPM`, is cut off by the cyclic loop, which removes the power: the axis is
+        enabled again for the next pulse.
         """
         self._percent, self._still, self._made = threshold.FIRST_PERCENT, 0, 0
         begin = await self._place()
@@ -273,13 +279,15 @@ class _Test:
             self._still = self._still + 1 if moved <= STILL_REV else 0
             if self._percent >= 0.999 * self._cap and self._still >= 2:
                 return False
-            self._adapt(moved)
+            if not fits_again(pulse, self._settings.travel_limit):
+                return False
+            self._adapt(moved, cut=cut)
             if cut:
                 return True
         return False
 
-    def _adapt(self, moved: float) -> None:
-        if moved < threshold.SMALL_REV:
+    def _adapt(self, moved: float, *, cut: bool) -> None:
+        if moved < (STILL_REV if cut else threshold.SMALL_REV):
             self._percent = min(self._percent * threshold.STRONGER, self._cap)
         elif moved > threshold.LARGE_REV:
             self._percent = max(self._percent / threshold.WEAKER, threshold.FIRST_PERCENT)
@@ -316,14 +324,21 @@ class _Test:
         return pulse, cut
 
     def _around(self, place_rev: float) -> bus.Envelope:
-        """Limits of one pulse: some degrees, within those of the whole test."""
+        """Limits of one pulse: some degrees and a low speed, within those of the whole test.
+
+        A shaft that sticks accelerates at its break-away by nearly the whole pulse, and coasts
+        afterwards: the speed decides how far. One that coasted out of the travel may move back.
+        """
         limits, here = self._limits, self._start + self._units.position_raw(place_rev)
         way = abs(self._units.position_raw(threshold.CUT_REV))
+        slow = abs(self._units.velocity_raw(threshold.CUT_RPM))
+        still = abs(self._units.position_raw(STILL_REV))
         assert limits.position_min is not None and limits.position_max is not None  # noqa: PT018
         return replace(
             limits,
-            position_min=max(limits.position_min, here - way),
-            position_max=min(limits.position_max, here + way),
+            position_min=max(min(limits.position_min, here - still), here - way),
+            position_max=min(max(limits.position_max, here + still), here + way),
+            speed_max=slow if limits.speed_max is None else min(limits.speed_max, slow),
         )
 
     def _sequence(self, percent: float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -138,6 +138,39 @@ async def test_wrong_counts_are_found_before_anything_is_energised(share: float)
     assert shaft_rev(bench) == 1.0
 
 
+@pytest.mark.parametrize(
+    ("drive", "coulomb_nm", "found_as"),
+    [
+        ("mms7", 0.01, {"right"}),
+        ("r6l", 0.01, {"right"}),
+        # One pulse takes it nearly through the travel: what is left may not suffice for another.
+        ("mms7", 0.004, {"right", "short"}),
+    ],
+)
+async def test_a_shaft_that_sticks_stays_within_the_travel(
+    drive: str, coulomb_nm: float, found_as: set[str]
+) -> None:
+    """It breaks away at 8 % of rated torque, and then nearly nothing holds a bare rotor."""
+    spec = motor()
+    friction = spec.friction.model_copy(update={"static_nm": 0.1, "coulomb_nm": coulomb_nm})
+    bare = spec.model_copy(update={"friction": friction, "load": ()})
+    async with direct(bare, drive=drive) as bench:
+        found = await first_power(bench)
+        assert finding(found, "phases")[1] in found_as
+        assert found.travel_rev <= 0.1
+        assert abs(shaft_rev(bench)) <= 0.1
+
+
+async def test_a_shaft_that_was_moved_out_of_the_travel_is_moved_back() -> None:
+    """Somebody pushes it while it is measured forwards: backwards it is still not blocked."""
+    async with direct(motor(), drive="r6l") as bench:
+        push = At("pulses", lambda: shaft(bench).place(2 * math.pi * 0.15), 0.52)
+        found = await first_power(bench, progress=push)
+        assert push.done
+        assert finding(found, "phases") == ("passed", "right")
+        assert found.pulses[-1].to_rev < 0.1
+
+
 async def test_a_closed_brake_moves_nothing() -> None:
     found, _ = await on("r6l", planted(motor(), "brake_closed"))
     assert finding(found, "brake") == ("open", "not_seen")

@@ -12,8 +12,10 @@ from backend.tools.first_power.evaluate import (
     Seen,
     arrays_of,
     covered_pole_pairs,
+    ended_for_room,
     evaluate,
     facts_of,
+    fits_again,
     reevaluate,
 )
 from backend.tools.first_power.result import FirstPowerResult, Pulse
@@ -89,6 +91,29 @@ def test_a_pulling_load_a_blocked_side_and_a_closed_brake() -> None:
     stuck = [each for each in pulses(lambda _: 0.0) if each.direction < 0]
     assert finding(made([*forwards, *stuck]), "phases") == "blocked"
     assert finding(made(forwards), "phases") == "short"
+
+
+def pulse(way: Literal[1, -1], begin: float, end: float, percent: float = 9.0) -> Pulse:
+    return Pulse(direction=way, torque_percent=percent, from_rev=begin, to_rev=end)
+
+
+def test_a_pulse_that_coasts_far_is_repeated_only_where_it_has_room() -> None:
+    assert fits_again(pulse(1, 0.0, 0.04), 0.1)
+    assert not fits_again(pulse(1, 0.0, 0.06), 0.1)
+    assert not fits_again(pulse(1, -0.02, -0.07), 0.1)
+    assert fits_again(pulse(-1, 0.15, 0.1), 0.1), "back towards the start"
+    assert fits_again(pulse(1, 0.1, 0.1), 0.1), "it did not move"
+
+
+def test_a_way_that_ended_for_room_is_open_until_it_was_made_again() -> None:
+    first = [pulse(1, 0.0, 0.0, 6.7), pulse(1, 0.0, 0.055)]
+    back = [pulse(-1, 0.055, 0.0), pulse(-1, 0.0, -0.055)]
+    assert ended_for_room(first, ASKED)
+    assert ended_for_room([*first, *back], ASKED)
+    assert finding(made([*first, *back]), "phases") == "short", "neither locked nor right"
+    again = [pulse(1, -0.055, 0.0), pulse(1, 0.0, 0.055)]
+    assert not ended_for_room([*first, *back, *again], ASKED)
+    assert finding(made([*first, *back, *again]), "phases") == "right"
 
 
 @pytest.mark.parametrize(
