@@ -308,6 +308,10 @@ class brake_run:
     AFTER_HALT_S = 0.1
     """[s] After a halt the loop goes on telling what happens; the torque is gone within that.
     Origin: ca58f5df."""
+    RAN_ON_REV = 0.05
+    """[rev] A shaft that runs so far beyond its limit is not stopped by its brake, and the other
+    direction is not tested. A worn brake ends within 0.01 rev, a lost one lets it coast 0.3 to 0.5
+    rev. Origin: 28 November 2026, `tests/virtual/tools/test_brake_test.py`."""
 
 
 class first_power_evaluate:

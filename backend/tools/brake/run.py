@@ -123,8 +123,9 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
         for number, direction in enumerate(_DIRECTIONS):
             trial = await _trial(run, settings, facts, units, direction, percent, number)
             trials.append(trial)
-            if trial.halted and not np.any(trial.phase[_sent(trial)] >= Phase.RAMP):
-                break  # the brake is open: the other direction would only turn the axis as well
+            reached = np.any(trial.phase[_sent(trial)] >= Phase.RAMP)
+            if trial.halted and (not reached or _ran_on(trial, settings.envelope.travel_rev)):
+                break  # no brake holds it: the other direction would only turn the axis as well
     run.progress(0.95, text("brake.evaluating"))
     test = Trials(
         tuple(trials),
@@ -142,6 +143,15 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
 
 def _sent(trial: Trial) -> npt.NDArray[np.bool_]:
     return np.abs(trial.sent_nm) > 0
+
+
+def _ran_on(trial: Trial, limit_rev: float) -> bool:
+    """Whether the shaft ran on beyond the limit without torque, as no brake stopped it."""
+    position = trial.position_rad[trial.valid]
+    if not position.size:
+        return False
+    away_rev = float(np.max(np.abs(position - position[0]))) / (2 * np.pi)
+    return away_rev > limit_rev + threshold.RAN_ON_REV
 
 
 async def _obstacle(run: Run, settings: BrakeSettings) -> Obstacle | None:

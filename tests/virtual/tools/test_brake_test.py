@@ -104,6 +104,32 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
     assert gone - passed <= 20.0
 
 
+async def test_a_brake_that_lets_go_altogether_is_not_tested_in_the_other_direction() -> None:
+    """It opens at 90 % of the rated torque and does not close again: the shaft coasts."""
+    spec = braked(2.0 * RATED_NM, windup_rev=WINDUP_REV, supplied=False)
+    async with direct(spec, drive="ep3e") as bench:
+        core = bench.link.device.axis  # type: ignore[attr-defined]
+        advance = bench.link.device.advance
+        opened = []
+
+        def watched(t_ns: int) -> None:
+            advance(t_ns)
+            if not opened and abs(float(core.s[k.S_TORQUE])) > 0.9 * RATED_NM:
+                opened.append(t_ns)
+                core.p[k.P_BRAKE_TORQUE] = 0.0
+
+        bench.link.device.advance = watched  # type: ignore[method-assign]
+        found = await brake_of(bench.axis, bench.session, CUT)
+        assert await bench.axis.state() is not State.OPERATION_ENABLED
+    assert opened
+    assert found.verdict == "slipped"
+    (way,) = found.ways
+    assert way.direction == 1
+    assert way.travel_rev > 0.1
+    assert way.abort_ms is not None
+    assert way.abort_ms <= 20.0
+
+
 async def test_an_open_brake_moves_by_the_preload_alone() -> None:
     """Its output is another one than the drive was reported: it follows the power stage."""
     spec = braked(2.0 * RATED_NM)
