@@ -83,6 +83,8 @@ class FeedbackWatch:
         self._part_s = window_s / _PARTS
         self._parts: deque[_Part] = deque(maxlen=_PARTS)
         self._open = _Part()
+        self._latest: tuple[int, float] | None = None
+        """Increments and time [s] of the last two closed parts; None before the second."""
         self._last: tuple[int, float, float] | None = None
         self._newest: deque[tuple[int, float, float]] = deque(maxlen=_INSTANT)
         self._samples = 0
@@ -100,19 +102,24 @@ class FeedbackWatch:
         self._newest.append(self._last)
         if last is None or at_s <= last[2]:
             return None
-        step = abs(velocity - last[1])
+        position_before, velocity_before, before_s = last
+        step = abs(velocity - velocity_before)
         if step and (not self._finest or step < self._finest):
             self._finest = step
         part = self._open
-        elapsed = at_s - last[2]
-        part.moved += _difference(position, last[0])
-        part.reported += 0.5 * (velocity + last[1]) * elapsed
+        elapsed = at_s - before_s
+        part.moved += _difference(position, position_before)
+        part.reported += 0.5 * (velocity + velocity_before) * elapsed
         part.time_s += elapsed
-        part.peak_reported = max(part.peak_reported, abs(velocity))
+        if (size := abs(velocity)) > part.peak_reported:
+            part.peak_reported = size
         self._samples += 1
         if part.time_s < self._part_s or self._samples < 2:
             return None
         self._parts.append(part)
+        if len(self._parts) > 1:
+            before = self._parts[-2]
+            self._latest = before.moved + part.moved, before.time_s + part.time_s
         self._open, self._samples = _Part(), 0
         return self._judge() if len(self._parts) == _PARTS else None
 
@@ -128,16 +135,16 @@ class FeedbackWatch:
     def interrupt(self) -> None:
         """Begin a new window: the position was set again (homing), or samples are missing."""
         self._parts.clear()
+        self._latest = None
         self._newest.clear()
         self._open, self._samples, self._votes, self._last = _Part(), 0, 0, None
         self._undated = 0
 
     def too_fast(self, limit: float) -> float | None:
         """Return the speed by position [raw 606Ch] if it certainly exceeds the limit, or None."""
-        if len(self._parts) < 2:
+        if self._latest is None:
             return None
-        recent = list(self._parts)[-2:]
-        moved, time_s = sum(p.moved for p in recent), sum(p.time_s for p in recent)
+        moved, time_s = self._latest
         per = abs(self._scale.velocity_per_inc_s)
         least = (abs(moved) - _COUNTS) / time_s * per
         return moved / time_s * self._scale.velocity_per_inc_s if least > limit else None

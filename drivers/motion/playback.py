@@ -104,6 +104,14 @@ class AxisLoop:
         """Why the last motion was ended by force, or why the drive is no longer enabled."""
         self._in = inputs
         self._out = outputs
+        # Looked up once, as they are used in every cycle.
+        self._mode_at, self._status_at = inputs.get(MODE_SHOWN), inputs.get(STATUS)
+        self._position_at = inputs.get(ACTUAL_POSITION)
+        self._velocity_at = inputs.get(ACTUAL_VELOCITY)
+        self._torque_at = inputs.get(ACTUAL_TORQUE)
+        self._word: int | None = None
+        self._reported = State.UNKNOWN
+        """The state in the status word ``_word``."""
         self._report = report
         self._dialect = dialect
         self._pause_cycles = round(dialect.pause_s / cycle_s)
@@ -279,29 +287,33 @@ class AxisLoop:
         """
         self._cycles += 1
         self._sampled_s = self._cycles * self._cycle_s + late_s
-        place = self._in.get(MODE_SHOWN)
-        if place is not None:
-            self._mode = values[place]
-        place_of_status = self._in.get(STATUS)
+        if self._mode_at is not None:
+            self._mode = values[self._mode_at]
+        place_of_status = self._status_at
         if place_of_status is not None:
-            self.state = cia402.decode_state(
-                values[place_of_status], echoes_control=self._dialect.echoes_control
-            )
-        place = self._in.get(ACTUAL_POSITION)
-        if place is not None:
-            position = values[place]
+            self.state = self._state_of(values[place_of_status])
+        if self._position_at is not None:
+            position = values[self._position_at]
             self._moved = 0 if self._last_position is None else abs(position - self._last_position)
             self._last_position = position
         enabled = self.state is State.OPERATION_ENABLED
         if self._was_enabled and not enabled:
             self._fell_out(0 if place_of_status is None else values[place_of_status])
         self._was_enabled = enabled and not self._stale
-        self._stale = max(self._stale - 1, 0)
+        if self._stale > 0:
+            self._stale -= 1
         if self.phase in (Phase.PLAYING, Phase.HOLDING):
             self._guard(values)
         self._setpoints(values, enabled=enabled)
         if CONTROL in self._out:
             self._control()
+
+    def _state_of(self, word: int) -> State:
+        if word != self._word:
+            self._word = word
+            echoes = self._dialect.echoes_control
+            self._reported = cia402.decode_state(word, echoes_control=echoes)
+        return self._reported
 
     def blind(self) -> None:
         """Advance one cycle without valid inputs: setpoints continue, inputs are not evaluated.
@@ -357,7 +369,7 @@ class AxisLoop:
         if self._age(1):
             return
         limits = self._motion.limits
-        position = self._value(values, ACTUAL_POSITION)
+        position = None if self._position_at is None else values[self._position_at]
         if position is not None:
             if limits.position_min is not None and position < limits.position_min:
                 self.stop(Halted.beyond("position", position, limits.position_min))
@@ -365,13 +377,14 @@ class AxisLoop:
             if limits.position_max is not None and position > limits.position_max:
                 self.stop(Halted.beyond("position", position, limits.position_max))
                 return
-        velocity = self._value(values, ACTUAL_VELOCITY)
+        velocity = None if self._velocity_at is None else values[self._velocity_at]
         place = None if position is None else round(position)
         halt = self._speed_guard.look(place, velocity, self._sampled_s)
         if halt is not None:
             self.stop(halt)
             return
-        torque, most = self._value(values, ACTUAL_TORQUE), limits.torque_max
+        torque = None if self._torque_at is None else values[self._torque_at]
+        most = limits.torque_max
         if most is not None and torque is not None and abs(torque) > most:
             self._no_faster_than_it_turns(values)
             self.stop(Halted.beyond("torque", torque, most))

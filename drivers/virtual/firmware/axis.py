@@ -67,11 +67,7 @@ class VirtualAxis:
     def run(self, steps: int) -> int:
         """Advance by up to ``steps`` of 50 µs; return how many were done before an event."""
         self.s[k.S_EVENTS] = 0.0
-        chain = self._chain
-        done: int = run(
-            steps, self.p, self.s, self._x, chain.a, chain.b, chain.gap_state,
-            chain.half_gap_rad, self._scratch, self._random,
-        )  # fmt: skip
+        done: int = run(steps, *self._arrays)
         return done
 
     def share_state(self, x: npt.NDArray[np.float64]) -> npt.NDArray[np.uint64]:
@@ -82,6 +78,7 @@ class VirtualAxis:
         """
         x[:] = self._x
         self._x = x
+        self._collect()
         return self._random
 
     @property
@@ -111,6 +108,15 @@ class VirtualAxis:
         if bandwidth_hz != self._current_loop_hz:
             self._current_loop_hz = bandwidth_hz
             self._chain = discretise(self.spec, loop_parameters.TURN * bandwidth_hz, k.STEP_S)
+            self._collect()
+
+    def _collect(self) -> None:
+        """Collect the arrays of `run`, which is called in every cycle."""
+        chain = self._chain
+        self._arrays = (
+            self.p, self.s, self._x, chain.a, chain.b, chain.gap_state,
+            chain.half_gap_rad, self._scratch, self._random,
+        )  # fmt: skip
 
     def apply_loops(self, loops: LoopSettings) -> None:
         """Set gains, filters, feed-forward and notches."""

@@ -333,8 +333,9 @@ class DeviceControl:
         traits = self._traits
         if traits.status == "echo":
             return self._echo_status()
-        word = self.state.value | 0x0210
-        if self.state is State.SWITCH_ON_DISABLED:
+        state = self.state
+        word = state.bits | 0x0210
+        if state is State.SWITCH_ON_DISABLED:
             word |= traits.disabled_bits
         if traits.home_found_bit is not None and self.homed:
             word |= 1 << traits.home_found_bit
@@ -342,7 +343,7 @@ class DeviceControl:
             word |= 1 << 7
         if self.identification.active:
             word |= 1 << 14
-        return word | self.modes.status_bits(self._stopping, self.state in _OPERATING)
+        return word | self.modes.status_bits(self._stopping, state in _OPERATING)
 
     @property
     def _stopping(self) -> bool:

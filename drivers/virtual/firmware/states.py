@@ -8,6 +8,10 @@ from enum import Enum
 class State(Enum):
     """States with the status word bits that show them (mask 0x6F)."""
 
+    def __init__(self, bits: int) -> None:
+        self.bits = bits
+        """The value; an enumeration looks that up more slowly, and this is read in every cycle."""
+
     NOT_READY = 0x00
     SWITCH_ON_DISABLED = 0x40
     READY = 0x21

@@ -28,6 +28,8 @@ class VirtualGantry:
         self._servos = (first, second)
         self.x = np.zeros(STATES)
         self._scratch = np.zeros(STATES)
+        self._corners = (0.0, 0.0)
+        self._a = self._b = np.zeros((0, 0))
         self._randoms = (
             first.axis.share_state(self.x[:SECOND]),
             second.axis.share_state(self.x[SECOND:MEAN]),
@@ -47,10 +49,14 @@ class VirtualGantry:
         first, second = (servo.axis for servo in self._servos)
         first.s[k.S_EVENTS] = second.s[k.S_EVENTS] = 0.0
         corners = (first.current_loop_rad_s, second.current_loop_rad_s)
-        a, b = discretise_gantry(self.spec, (first.spec, second.spec), corners, k.STEP_S)
+        if corners != self._corners:
+            # Not in every run: the look-up by mechanics takes 9 µs, all steps of a cycle 39 µs.
+            self._corners = corners
+            specs = (first.spec, second.spec)
+            self._a, self._b = discretise_gantry(self.spec, specs, corners, k.STEP_S)
         done: int = run_pair(
             steps, first.p, first.s, self._randoms[0], second.p, second.s, self._randoms[1],
-            self.x, a, b, self._scratch,
+            self.x, self._a, self._b, self._scratch,
         )  # fmt: skip
         for servo in self._servos:
             servo.take_events()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from drivers.virtual.device import (
     ABORT_NOT_MAPPABLE,
@@ -86,6 +88,10 @@ class OutputImage:
         self._struct = _layout(parts)
         self.size = self._struct.size
         self._entries = [part for part in parts if isinstance(part, Entry)]
+        places = [
+            _Place(place, entry, *_limits(entry)) for place, entry in enumerate(self._entries)
+        ]
+        self._places = sorted(places, key=lambda each: _ORDER.get(each.entry.key, 0))
         self._od = od
         self._arrived = arrived
         self._last: bytes | None = None
@@ -104,12 +110,16 @@ class OutputImage:
         self._arrived()
 
     def _take(self, values: tuple[Number, ...]) -> None:
-        changed = [
-            (entry, limited, entry.value)
-            for entry, value in zip(self._entries, values, strict=True)
-            if (limited := _limited(entry, value)) != entry.value
-        ]
-        changed.sort(key=lambda item: _ORDER.get(item[0].key, 0))
+        changed = []
+        for place, entry, low, high in self._places:
+            value = values[place]
+            if value < low:
+                value = low
+            elif value > high:
+                value = high
+            before = entry.value
+            if value != before:
+                changed.append((entry, value, before))
         for entry, value, _ in changed:
             entry.value = entry.active = value
         for entry, value, before in changed:
@@ -126,10 +136,15 @@ class OutputImage:
 _ORDER = {"6060:00": 1, "6040:00": 2}
 
 
-def _limited(entry: Entry, value: Number) -> Number:
+class _Place(NamedTuple):
+    """Where an output lies among the values of a cycle, and its limits, found once."""
+
+    place: int
+    entry: Entry
+    low: Number
+    high: Number
+
+
+def _limits(entry: Entry) -> tuple[Number, Number]:
     low, high = entry.parameter.raw_limits
-    if low is not None and value < low:
-        return low
-    if high is not None and value > high:
-        return high
-    return value
+    return (-math.inf if low is None else low, math.inf if high is None else high)
