@@ -94,8 +94,10 @@ class Segment:
         now = datetime.now(UTC)
 
         def calm() -> bool:
-            jobs = self.station.ok(self.station.http.get("/jobs"))
+            # The states first: a drive's first answer after its return begins the job that reads
+            # it anew and restores what a motion left changed; until that ends, nothing may move.
             states = [self.station.state(drive) for drive in (self.a, self.b)]
+            jobs = self.station.ok(self.station.http.get("/jobs"))
             asked = all(datetime.fromisoformat(state["time"]) > now for state in states)
             fresh = all(state["fresh"] for state in states)
             return asked and fresh and all(job["state"] != "running" for job in jobs)
