@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import can
 
@@ -23,12 +23,12 @@ from backend.axes.drive.ports import Port
 from backend.tools.sweep import profile_speed
 from drivers.canopen.frames import SYNC, Frame
 from drivers.canopen.link import CanopenLink
-from drivers.link import Trajectory
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.wires.canopen import CanopenNode
 from profiles.loader import load_profile
+from tests.virtual.tools.rig import outlive
 
 STATION = 3
 _numbers = itertools.count()
@@ -156,7 +156,7 @@ async def can_bench(
         session = CyclicSession(link, [one], {"x"} if profile_speed.needed(one, link) else ())
         axis = Axis(one)
         if patient:
-            _outlive(session)
+            outlive(session)
         await session.start(cycle_s)
         axis.session = session
         try:
@@ -166,12 +166,3 @@ async def can_bench(
             await session.stop()
     finally:
         await link.close()
-
-
-def _outlive(session: CyclicSession) -> None:
-    play = session.cyclic.play
-
-    async def patiently(trajectories: list[Trajectory]) -> int:
-        return await play([replace(t, renew_s=100.0) for t in trajectories])
-
-    session.cyclic.play = patiently  # type: ignore[method-assign, assignment]

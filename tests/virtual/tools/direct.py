@@ -59,8 +59,8 @@ _MODE = 0x6060
 #: Simulated time for one access to the dictionary.
 _ACCESS_NS = 200_000
 _TURN_NS = 20_000_000
-#: What a turn lasts for those who compute meanwhile, in time of a processor.
-_REST_S = 0.01
+#: What a turn lasts for those who compute meanwhile, in time of a processor: as long as the turn.
+_REST_S = 0.02
 #: Setpoints live this much longer than on a wire: simulated time outruns the tools' clock.
 _PATIENCE = 1000
 
@@ -282,6 +282,7 @@ class DirectLink:
         self._pack, self._unpack = layout(plan.rx.entries), layout(plan.tx.entries)
         names = {(s.address.index, s.address.subindex): s.channel for s in plan.mapped}
         self._columns = _columns(plan.rx, names), _columns(plan.tx, names)
+        self._taken = tuple([place for place, _ in part] for part in self._columns)
         self._channels = tuple(n for part in self._columns for _, n in part)
         known = [e for e in plan.rx.entries if e.code != "x"]
         self._written = places(plan.rx.entries)
@@ -296,7 +297,8 @@ class DirectLink:
         if _MODE in self._written:
             mode = self.device.read(_MODE, 0)
             self._loop.outputs[self._written[_MODE]] = int.from_bytes(mode, "little", signed=True)
-        self._watch = places(plan.tx.entries)
+        found = places(plan.tx.entries)
+        self._watch = found[0x606C], found[0x6077], found[0x6064]
         return plan.mapped
 
     async def start(self) -> None:
@@ -358,12 +360,13 @@ class DirectLink:
     def _cycle(self) -> list[float]:
         loop = self._loop
         assert loop is not None
-        sent = self._pack.pack(*loop.outputs)
+        outputs = loop.outputs
+        sent = self._pack.pack(*outputs)
         self.now_ns += self.cycle_ns
         self.device.advance(self.now_ns)
         values = self._unpack.unpack(self._latched)
-        outputs = self._pack.unpack(sent)
-        row = [outputs[i] for i, _ in self._columns[0]] + [values[i] for i, _ in self._columns[1]]
+        row: list[float] = [outputs[i] for i in self._taken[0]]
+        row += [values[i] for i in self._taken[1]]
         self._rx.unpack(sent)
         self._latched = self._tx.pack()
         self._extremes(values)
@@ -371,11 +374,11 @@ class DirectLink:
         return row
 
     def _extremes(self, values: tuple[int, ...]) -> None:
-        h, w = self.highest, self._watch
-        h["speed"] = max(h["speed"], abs(values[w[0x606C]]))
-        h["torque"] = max(h["torque"], abs(values[w[0x6077]]))
-        h["low"] = min(h["low"], values[w[0x6064]])
-        h["high"] = max(h["high"], values[w[0x6064]])
+        highest, (speed, torque, position) = self.highest, self._watch
+        highest["speed"] = max(highest["speed"], abs(values[speed]))
+        highest["torque"] = max(highest["torque"], abs(values[torque]))
+        highest["low"] = min(highest["low"], values[position])
+        highest["high"] = max(highest["high"], values[position])
 
     async def play(self, trajectories: Sequence[Trajectory]) -> int:
         assert self._loop is not None

@@ -51,8 +51,9 @@ async def test_a_vertical_axis_whose_computer_is_late(
     drive: str, every_s: float, cycles_late: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From 1 to 3 % of all cycles, which leaves hardly a realisation whole."""
-    # 4 ms for each parameter, as over EtherCAT at 1 kHz.
+    # 4 ms for each parameter, as over EtherCAT at 1 kHz; computing is counted by _COMPUTING_S.
     monkeypatch.setattr(direct_module, "_TURN_NS", 4_000_000)
+    monkeypatch.setattr(direct_module, "_REST_S", 0.01)
     async with direct(vertical(), drive=drive) as b:
         clock = SimpleNamespace(monotonic=lambda: b.link.now_ns / 1e9)
         for tool in (notch_effect, notch_in_loop, repeats, sweep_play, tune_time, tune_verify):

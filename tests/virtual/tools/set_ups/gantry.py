@@ -27,7 +27,7 @@ from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace
 from profiles.loader import load_profile
 from tests.support.granted import set_up
-from tests.virtual.tools.rig import URL, settings_of, silent
+from tests.virtual.tools.rig import PACE, URL, outlive, settings_of, silent
 
 RATED = 1.27
 
@@ -126,7 +126,7 @@ async def gantry(
             "--bench", str(file), "--on", URL, "--sdo-ms", "0.2", "--eeprom-us", "5", "--lockstep",
         ]  # fmt: skip
         with VirtualSegment.start("ec0s", arguments, namespace) as segment:
-            link = EthercatLink("ec0m", url=URL, launcher=namespace.command([]), lockstep=1.2)
+            link = EthercatLink("ec0m", url=URL, launcher=namespace.command([]), lockstep=PACE)
             await link.open()
             try:
                 profile = load_profile("mms7")
@@ -141,6 +141,7 @@ async def gantry(
                     await make_effective(axis)
                     found.append(axis)
                 session = CyclicSession(link, [axis.drive for axis in found])
+                outlive(session)
                 await session.start(1e-3)
                 for axis in found:
                     axis.session = session
