@@ -69,7 +69,7 @@ describe('the end of forcing', () => {
     await press('End and restore')
     await settled()
     const problem = refusal(500, { detail: '60FE:02 stays at 1' })
-    await state({ state: 'failed', ended: '2026-11-28T00:00:00Z', problem } as Partial<JobInfo>)
+    await state({ state: 'failed', ended: '2026-11-28T00:00:00Z', problem })
     expect(screen.getByText(/60FE:02 stays at 1/)).not.toBeNull()
   })
 
