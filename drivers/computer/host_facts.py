@@ -198,7 +198,8 @@ class Computer:
         return "NetworkManager" if re.search(r"^managed=(true|full)$", state, re.MULTILINE) else ""
 
     def _dhcp_client(self, name: str, index: str, processes: list[list[str]]) -> str:
-        if (self.root / f"run/systemd/netif/leases/{index}").exists():
+        # /sys can show the interfaces of another network namespace: then the index is unknown.
+        if index and (self.root / f"run/systemd/netif/leases/{index}").exists():
             return "systemd-networkd"
         clients = (one[0] for one in processes if one[0] in _DHCP_CLIENTS and name in one[1:])
         return next(clients, "")

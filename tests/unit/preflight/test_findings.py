@@ -101,6 +101,14 @@ def test_it_is_named_before_two_lesser_ones(
     assert found(fake)[0] is code
 
 
+def test_a_port_that_sys_does_not_show_has_no_lease_of_another(tmp_path: Path) -> None:
+    """In a network namespace with the /sys of another one."""
+    fake = FakeComputer(tmp_path)
+    fake.write("run/systemd/netif/leases/7", "ADDRESS=1")
+    (fake.root / "sys/class/net/eth1/ifindex").unlink()
+    assert found(fake) == []
+
+
 def test_the_order_is_by_effect_then_by_delay(tmp_path: Path) -> None:
     fake = FakeComputer(tmp_path)
     for cause in (deep_idle, managed, wireless):
