@@ -10,7 +10,7 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public drivers/texts/catalogue -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs pictures page new-drive clean check-python supply-chain wheels packages emulated audit
+.PHONY: install run test bench fmt docs pictures page new-drive clean check-python supply-chain wheels packages emulated wine audit
 
 install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
 
@@ -54,11 +54,14 @@ packages: $(VENV)/.dev $(PAGE) wheels ## all that is carried to a computer, with
 	$(BIN)/python .ci/supply/portable.py dist/wheels dist x86_64
 	$(BIN)/python .ci/supply/portable.py dist/wheels dist aarch64
 	$(BIN)/python .ci/supply/container.py dist/wheels dist x86_64
-	$(if $(WINDOWS_PYTHON),$(BIN)/python .ci/supply/windows.py dist/wheels dist $(WINDOWS_PYTHON),@echo "no folder for Windows: WINDOWS_PYTHON=FILE names the embeddable CPython, see docs/install.md")
+	$(BIN)/python .ci/supply/windows.py dist/wheels dist $(WINDOWS_PYTHON)
 	$(BIN)/python .ci/supply/checksums.py dist
 
 emulated: $(VENV)/.dev ## start the folder for aarch64 under qemu's user mode
 	$(BIN)/python .ci/supply/emulated.py $(lastword $(sort $(wildcard dist/servodeck-*-linux-aarch64.tar.gz)))
+
+wine: $(VENV)/.dev ## start programs of the folder for Windows under Wine
+	$(BIN)/python .ci/supply/under_wine.py $(lastword $(sort $(wildcard dist/servodeck-*-windows-x86_64.zip)))
 
 # --strict: without it a package that the registry does not tell about passes for one without weaknesses.
 audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their registries, fails where one does not answer

@@ -29,11 +29,11 @@ _OF_LINUX = re.compile(
 #: Of Windows 10 and newer: its own libraries, the universal C runtime, and its interface sets.
 _OF_WINDOWS = frozenset(
     f"{name}.dll" for name in (
-        "advapi32", "avicap32", "avrt", "bcrypt", "bcryptprimitives", "cfgmgr32", "combase",
-        "comctl32", "comdlg32", "credui", "crypt32", "cryptbase", "d3d11", "d3d12",
+        "advapi32", "avicap32", "avrt", "bcrypt", "bcryptprimitives", "cabinet", "cfgmgr32",
+        "combase", "comctl32", "comdlg32", "credui", "crypt32", "cryptbase", "d3d11", "d3d12",
         "d3dcompiler_47", "dbghelp", "dnsapi", "dsound", "dwmapi", "dwrite", "dxgi",
         "dxva2", "gdi32", "glu32", "imm32", "iphlpapi", "kernel32", "mf", "mfplat",
-        "mfreadwrite", "mpr", "mswsock", "ncrypt", "netapi32", "ntdll", "ole32", "oleaut32",
+        "mfreadwrite", "mpr", "msi", "mswsock", "ncrypt", "netapi32", "ntdll", "ole32", "oleaut32",
         "opengl32", "pdh", "powrprof", "propsys", "psapi", "rpcrt4", "secur32", "setupapi",
         "shcore", "shell32", "shlwapi", "synchronization", "ucrtbase", "uiautomationcore",
         "user32", "userenv", "usp10", "uxtheme", "version", "wbemuuid", "webservices",

