@@ -33,7 +33,7 @@ def open_below(path: str) -> list[str]:
 
 def _whole(path: Any, dir_fd: int | None) -> str:
     base = Path.cwd() if dir_fd is None else Path(f"/proc/self/fd/{dir_fd}").readlink()
-    return os.path.normpath(base / path)
+    return str(os.path.normpath(base / path))
 
 
 def keep_rules(monkeypatch: pytest.MonkeyPatch) -> None:
