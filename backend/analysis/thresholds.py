@@ -1117,6 +1117,38 @@ class reported:
     """[s] Origin: cf5eb651."""
 
 
+class reported_demand:
+    """`response/reported_demand.py`."""
+
+    # AT_ONCE_HZ, CLEARLY: A torque follows at once where this corner leaves less than this share of
+    # what an ordinary current loop does.
+    AT_ONCE_HZ = 2e4
+    """[Hz] Origin: reported.COMMANDED_HZ, well above."""
+    CLEARLY = 0.4
+    """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
+
+
+class reported_speed:
+    """`response/reported_speed.py`."""
+
+    FINER = 8
+    """[count] Samples between two samples for a derivative. Origin: line_spectra.FINER."""
+    UNKNOWN_DB = 1e3
+    """[dB] Deviation of lines that do not count. Origin: larger than any line's."""
+    # EXPLAINED, ABOVE_NOISE: Mechanics explain a view to this median misfit, or to this multiple of
+    # the deviation of its lines.
+    EXPLAINED = 0.006
+    """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
+    ABOVE_NOISE = 1.5
+    """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
+    # UNEXPLAINED, CLEARLY: A speed that leaves so much unexplained, or without which the position
+    # is explained to this share, is not used.
+    UNEXPLAINED = 0.02
+    """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
+    CLEARLY = 0.77
+    """[ratio] Origin: identify.CLEARLY."""
+
+
 class sampled_model:
     """`response/sampled_model.py`."""
 

@@ -20,6 +20,7 @@ from backend.analysis.response.path_fit import (
     path_between,
     path_covariance,
 )
+from backend.analysis.response.reported_speed import with_position_speed, without_weight
 from backend.analysis.response.sampled_model import LoopModel, SampledFit
 from backend.analysis.response.sampling import (
     Hold,
@@ -41,6 +42,8 @@ class Views:
 
     velocity: Frf
     position: Frf | None
+    speed_used: bool = True
+    """Whether the reported speed counts; without it ``velocity`` is derived, without weight."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,13 @@ class Task:
     jitter_s: float = 0.0
     inertia: KnownInertia | None = None
     loop: LoopModel | None = None
+    speed_used: bool = True
+    """Whether the reported speed counts; without it only the position shows the motion."""
+
+    def without_speed(self) -> Task:
+        """Return the task with the position alone as the motion."""
+        records = tuple(with_position_speed(record) for record in self.records)
+        return replace(self, records=records, speed_used=False)
 
     def trial(
         self,
@@ -145,6 +155,8 @@ class Task:
             jitter_s=self.jitter_s,
             position=True,
         )
+        if not self.speed_used:
+            return Views(without_weight(velocity), position, speed_used=False)
         return Views(velocity, position)
 
     def refined(self, first: Trial, path_of: Callable[[SampledFit], SignalPath]) -> Trial:

@@ -8,7 +8,9 @@ the ratio between the sampled and the true response.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -30,6 +32,8 @@ from backend.analysis.response.path_fit import (
     torque_left,
 )
 from backend.analysis.response.reference_gain import ReferenceLoop
+from backend.analysis.response.reported_demand import demand_path, with_acting_torque
+from backend.analysis.response.reported_speed import speed_contradicts, speed_suspect
 from backend.analysis.response.sampled_model import SampledFit
 from backend.analysis.response.sampling import (
     DIRECT_SHARE,
@@ -53,6 +57,7 @@ from backend.analysis.signals.arrays import ComplexArray
 from backend.analysis.signals.line_spectra import Quantity, Record
 from backend.analysis.signals.transient_removal import settled
 from backend.analysis.thresholds import identify as threshold
+from backend.analysis.thresholds import model_fit
 
 _HOLDS: tuple[Hold, ...] = ("zero", "linear")
 
@@ -77,6 +82,10 @@ class Identification:
     """Uncertainty of each mode of the model; empty where no model is trusted."""
     torque_dropped: bool = False
     """Whether the reported torque cannot be the mechanics' input, and was not used as such."""
+    torque_is_demand: bool = False
+    """Whether the reported torque is the demand of a closed loop; its lag was then added."""
+    speed_dropped: bool = False
+    """Whether the reported speed contradicts the position, and was not used."""
     torque_unexplained: bool = False
     """Whether hold, delay and one lag do not explain the reported torque."""
     by_place: InertiaByPlace | None = None
@@ -126,6 +135,15 @@ def identify_with_path(
     """
     closed = quantity == "torque_injection"
     corner_known = path.current_bandwidth_hz is not None
+    demand = None
+    if closed and loop is None:
+        demand = demand_path(records, path, hold_known=hold_known)
+    if demand is not None:
+        path = replace(path, current_bandwidth_hz=path.current_bandwidth_hz or USUAL_CURRENT_HZ)
+        records = tuple(
+            with_acting_torque(record, demand, path.current_bandwidth_hz or USUAL_CURRENT_HZ)
+            for record in records
+        )
     task = Task(
         settled(records), quantity, inertia=inertia, loop=None if loop is None else loop.controller
     )
@@ -133,8 +151,16 @@ def identify_with_path(
         paths = find_paths(task.records, path, loop_closed=closed, hold_known=hold_known)
     else:
         paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
+
+    def beside_loop(other: Task) -> list[Trial]:
+        if loop is not None:
+            return other.trials(paths)
+        by_speed = find_paths(other.records, path, loop_closed=True, hold_known=hold_known)
+        return other.trials(by_speed)
+
     if closed:
-        trials, dropped = task.trials(paths), False
+        task, trials = _with_true_speed(task, task.trials(paths), beside_loop)
+        dropped = False
     else:
         task, trials, dropped = _by_motion(task, paths, corner_known)
     best = trials[0]
@@ -161,7 +187,29 @@ def identify_with_path(
         and all(record.torque is not None for record in records)
         and torque_left(settled(records), made.fit.path) > threshold.TORQUE_LEFT
     )
-    return replace(made, torque_dropped=dropped, torque_unexplained=unexplained_torque)
+    return replace(
+        made,
+        torque_dropped=dropped,
+        torque_is_demand=demand is not None,
+        torque_unexplained=unexplained_torque,
+        speed_dropped=not task.speed_used,
+    )
+
+
+def _with_true_speed(
+    task: Task, trials: list[Trial], again: Callable[[Task], list[Trial]]
+) -> tuple[Task, list[Trial]]:
+    """Task and trials without the reported speed where it contradicts the position, else the same.
+
+    Decided before anything else: a late speed looks like mechanics, or like a late torque.
+    """
+    shown = all(r.position is not None and not r.excitation.segments for r in task.records)
+    if not task.speed_used or not shown or not speed_suspect(trials[0].solution):
+        return task, trials
+    alone = task.without_speed()
+    others = again(alone)
+    contradicts = speed_contradicts(trials[0].solution, others[0].solution)
+    return (alone, others) if contradicts else (task, trials)
 
 
 def _by_motion(
@@ -179,7 +227,9 @@ def _by_motion(
     a start: a search without a start converges slowly on a wrong path.
     """
     odd = _odd(task, paths[0], corner_known)
-    trials = [] if odd else task.trials(paths)
+    trials = []
+    if not odd:
+        task, trials = _with_true_speed(task, task.trials(paths), lambda t: t.trials(paths))
     if trials and not _suspect(task, trials[0], corner_known):
         return task, trials, False
     alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
@@ -188,12 +238,19 @@ def _by_motion(
     found: list[Trial] = []
     for corner in (reported or USUAL_CURRENT_HZ, threshold.SLOW_HZ):
         begun = replace(likeliest, current_bandwidth_hz=corner)
-        found += [alone.at_cycles(begun, hold) for hold in _HOLDS]
-        found.sort(key=rank)
-        found[0] = alone.by_motion(found[0])
-        if found[0].fit.error < threshold.EXPLAINED:
+        tried = _of_both_holds(alone, begun)
+        if not found:
+            alone, tried = _with_true_speed(alone, tried, partial(_of_both_holds, path=begun))
+        tried = sorted([alone.by_motion(tried[0]), *tried[1:]], key=rank)
+        # Mechanics imitate a slow torque, and fit a little better by it: it has to explain more.
+        better = not found or _explains(
+            tried[0].fit, found[0].fit, threshold.BY_MOTION, threshold.CLEARLY
+        )
+        found = [*tried, *found] if better else [*found, *tried]
+        if _explained(found[0].fit):
             break
-    found.sort(key=rank)
+    if not alone.speed_used and task.speed_used:
+        task = task.without_speed()
     best = found[0].fit
     if not trials:
         begun_there = [task.trial(each, None, None, found[0].solution) for each in paths]
@@ -203,6 +260,17 @@ def _by_motion(
     if _explains(best, trials[0].fit, threshold.BY_MOTION, threshold.CLEARLY):
         return alone, found, True
     return task, trials, False
+
+
+def _of_both_holds(task: Task, path: SignalPath) -> list[Trial]:
+    """Trials with this path's corner and each hold at its best cycles, best first."""
+    return sorted((task.at_cycles(path, hold) for hold in _HOLDS), key=rank)
+
+
+def _explained(fit: SampledFit) -> bool:
+    """Whether nothing but noise is left, or next to nothing."""
+    noise = float(np.sqrt(max(fit.noise**2 - model_fit.FLOOR**2, 0.0)))
+    return fit.error < max(threshold.EXPLAINED, noise)
 
 
 def _explains(one: SampledFit, other: SampledFit, by: float, share: float) -> bool:
@@ -226,7 +294,9 @@ def _suspect(task: Task, trial: Trial, corner_known: bool) -> bool:
     """Whether the motion indicates that the reported torque is not the one that drives it."""
     if any(record.torque is None for record in task.records):
         return False
-    late = abs(trial.fit.delay_s) > threshold.LEFT_BY_TORQUE_S
+    # A late torque is late for both, a late speed only for itself.
+    left_s = trial.fit.position_delay_s if trial.views.position else trial.fit.delay_s
+    late = abs(left_s) > threshold.LEFT_BY_TORQUE_S
     return late or _odd(task, trial.path, corner_known) or _beyond_passive(trial)
 
 
@@ -260,7 +330,8 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
 
     if fit.error > max(TRUSTED_ERROR, 1.5 * fit.noise):
         # An unknown speed filter would remain in the lines; the position passes none.
-        if views.position is not None and path.response_bandwidth_hz is None:
+        unfiltered = path.response_bandwidth_hz is None or not views.speed_used
+        if views.position is not None and unfiltered:
             plain = unexplained(views.position, trial.solution, 1)
         else:
             plain = unexplained(views.velocity, trial.solution, 0)
@@ -290,8 +361,12 @@ def _identification(task: Task, trial: Trial, uncertainty: Uncertainty) -> Ident
 
 
 def _without_path(trial: Trial) -> ComplexArray:
-    """The velocity's response without delay, filter and images."""
+    """The motion's response without delay, filter and images."""
     raw, fit = trial.views.velocity, trial.fit
+    if trial.views.position is not None and not trial.views.speed_used:
+        raw = trial.views.position
+        late = delay_response(raw.frequency_hz, fit.position_delay_s)
+        return np.asarray(raw.response / late / fit.image_factor(raw.frequency_hz, integrated=True))
     late = delay_response(raw.frequency_hz, fit.delay_s)
     if trial.path.response_bandwidth_hz is None:
         late = late * lag_response(raw.frequency_hz, fit.path.response_bandwidth_hz)

@@ -78,24 +78,49 @@ def distorted(frf: Frf, share: FloatArray) -> Frf:
 def pooled(parts: list[Frf]) -> Frf:
     """Combine estimates line by line by accuracy; the errors of two views may be the same.
 
-    A third view is a combination of the other two, and used where it is better than their mean.
+    Where both disagree, one of them is wrong: what the other's share does to the mean is added to
+    the band, around each line. A third view is a combination of the other two, and used where it is
+    better than their mean.
     """
     if len(parts) == 1:
         return parts[0]
     first, second = parts[:2]
     a, b = (np.maximum(np.nan_to_num(p.std_db, nan=1.0), 1e-6) ** -2 for p in (first, second))
     share = a / (a + b)
+    size, turn = _apart(first, second, np.minimum(share, 1.0 - share))
     response = first.response * share + second.response * (1.0 - share)
     mean = replace(
         first,
         response=np.asarray(response),
-        std_db=first.std_db * share + second.std_db * (1.0 - share),
-        std_deg=first.std_deg * share + second.std_deg * (1.0 - share),
+        std_db=np.hypot(first.std_db * share + second.std_db * (1.0 - share), size),
+        std_deg=np.hypot(first.std_deg * share + second.std_deg * (1.0 - share), turn),
         coherence=np.maximum(first.coherence, second.coherence),
         noise=first.noise * share + second.noise * (1.0 - share),
         distortion=first.distortion * share + second.distortion * (1.0 - share),
     )
-    return mean if len(parts) == 2 else _better(mean, parts[2])
+    if len(parts) == 2:
+        return mean
+    size, turn = _apart(parts[2], second, np.ones(share.size))
+    third = replace(
+        parts[2],
+        std_db=np.hypot(parts[2].std_db, size),
+        std_deg=np.hypot(parts[2].std_deg, turn),
+    )
+    return _better(mean, third)
+
+
+def _apart(one: Frf, other: Frf, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """A share of what two estimates differ by beyond their scatter, in dB and degrees."""
+    apart = np.log(one.response / other.response)
+    found = []
+    for part, unit, names in (
+        (apart.real, 20.0 / np.log(10.0), "std_db"),
+        (apart.imag, np.degrees(1.0), "std_deg"),
+    ):
+        scatter = np.hypot(getattr(one, names), getattr(other, names))
+        beyond = np.maximum((unit * part) ** 2 - scatter**2, 0.0)
+        found.append(share * np.sqrt(neighbour_mean(beyond, threshold.AROUND)))
+    return found[0], found[1]
 
 
 def _better(one: Frf, other: Frf) -> Frf:

@@ -51,6 +51,7 @@ _COMMANDED = text("sweep.torque-is-commanded")
 _SLOW = text("sweep.torque-follows-slowly")
 _SLOW_OR_FILTERED = text("sweep.slow-or-filtered")
 _DROPPED = text("sweep.torque-not-used")
+_SPEED_DROPPED = text("sweep.speed-not-used")
 _LOAD_DOES_NOT_FOLLOW = text("sweep.load-does-not-follow")
 
 
@@ -216,7 +217,7 @@ def _widened(
     """Widen the bands by what the drive does not report of its torque; with the warnings."""
     path, lines = found.fit.path, found.direct.frequency_hz
     said: list[Text] = []
-    if facts.current_bandwidth_hz is None and commanded(path):
+    if facts.current_bandwidth_hz is None and (commanded(path) or found.torque_is_demand):
         found = _charged(found, current_uncertainty(lines))
         said.append(_COMMANDED)
     corner = path.current_bandwidth_hz
@@ -278,7 +279,8 @@ def _mechanics(
         saturated_share=saturated,
         warnings=warnings,
         current_bandwidth_hz=path.current_bandwidth_hz,
-        speed_filter_hz=path.response_bandwidth_hz,
+        # What is no filter of first order has no corner of one.
+        speed_filter_hz=None if found.speed_dropped else path.response_bandwidth_hz,
         hold=path.hold,
         detected=found.distortion.detected if found.distortion is not None else None,
     )
@@ -407,6 +409,8 @@ def _warnings(found: Identification, saturated: float, facts: AxisFacts) -> tupl
         said.append(text("sweep.distortion-detected", **asdict(apart)))
     if found.torque_dropped:
         said.append(_DROPPED)
+    if found.speed_dropped:
+        said.append(_SPEED_DROPPED)
     if found.by_place is not None:
         said.append(
             text("sweep.by-place", amplitude_kgm2=found.by_place.amplitude_kgm2)

@@ -50,4 +50,5 @@ sweep_torque-follows-slowly = the torque follows its command more slowly than a 
 sweep_torque-is-commanded = the drive reports the commanded torque: the delay of its current loop is not known and widens the band
 sweep_torque-not-change = { $drive }: its actual torque ({ $parameter }) does not change with the speed setpoints; the mechanics cannot be measured by them
     .remedy = use a drive or a bus that reports the actual torque with every cycle
+sweep_speed-not-used = the speed that the drive reports (606Ch) is not the speed of the axis behind a delay and one filter; it may be a mean over some time. It was not used: the response was identified from the position (6064h)
 sweep_torque-not-used = the torque that the drive reports (6077h) is not the torque that moves the axis; it may be filtered, or a copy of the demand. It was not used: the response was identified from the motion alone

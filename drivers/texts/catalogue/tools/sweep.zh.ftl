@@ -50,4 +50,5 @@ sweep_torque-follows-slowly = 转矩跟随指令比电流环慢：驱动器中�
 sweep_torque-is-commanded = 驱动器上报的是指令转矩：其电流环的延迟未知，已计入误差带
 sweep_torque-not-change = { $drive }：其实际转矩（{ $parameter }）不随速度给定值变化，因此无法测量机械特性
     .remedy = 请使用每个周期都上报实际转矩的驱动器或总线
+sweep_speed-not-used = 驱动器报告的速度（606Ch）不是轴速度经延迟和一阶滤波的结果，可能是一段时间内的平均值。未使用该速度，响应由位置（6064h）辨识
 sweep_torque-not-used = 驱动器报告的转矩（6077h）不是驱动轴的转矩，可能经过滤波，或为指令的副本。未使用该转矩，响应仅由运动辨识
