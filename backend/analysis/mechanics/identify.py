@@ -32,6 +32,7 @@ from backend.analysis.response.path_fit import (
     torque_left,
 )
 from backend.analysis.response.reference_gain import ReferenceLoop
+from backend.analysis.response.reported import charged, current_uncertainty
 from backend.analysis.response.reported_demand import demand_path, with_acting_torque
 from backend.analysis.response.reported_speed import speed_contradicts, speed_suspect
 from backend.analysis.response.sampled_model import SampledFit
@@ -138,12 +139,10 @@ def identify_with_path(
     demand = None
     if closed and loop is None:
         demand = demand_path(records, path, hold_known=hold_known)
+    given, corner_hz = records, path.current_bandwidth_hz or USUAL_CURRENT_HZ
     if demand is not None:
-        path = replace(path, current_bandwidth_hz=path.current_bandwidth_hz or USUAL_CURRENT_HZ)
-        records = tuple(
-            with_acting_torque(record, demand, path.current_bandwidth_hz or USUAL_CURRENT_HZ)
-            for record in records
-        )
+        path = replace(path, current_bandwidth_hz=corner_hz)
+        records = tuple(with_acting_torque(record, demand, corner_hz) for record in given)
     task = Task(
         settled(records), quantity, inertia=inertia, loop=None if loop is None else loop.controller
     )
@@ -160,6 +159,12 @@ def identify_with_path(
 
     if closed:
         task, trials = _with_true_speed(task, task.trials(paths), beside_loop)
+        if demand is not None and trials[0].fit.loop.closed:
+            fit = trials[0].fit
+            records = tuple(with_acting_torque(r, demand, corner_hz, fit) for r in given)
+            fresh = replace(task, records=settled(records))
+            task = fresh if task.speed_used else fresh.without_speed()
+            trials = beside_loop(task)
         dropped = False
     else:
         task, trials, dropped = _by_motion(task, paths, corner_known)
@@ -187,6 +192,15 @@ def identify_with_path(
         and all(record.torque is not None for record in records)
         and torque_left(settled(records), made.fit.path) > threshold.TORQUE_LEFT
     )
+    if demand is not None:
+        # The lag that was added is that of an ordinary loop, not one that was seen.
+        lines = made.direct.frequency_hz
+        unseen = current_uncertainty(lines)
+        made = replace(
+            made,
+            direct=charged(made.direct, lines, unseen),
+            corrected=charged(made.corrected, lines, unseen),
+        )
     return replace(
         made,
         torque_dropped=dropped,

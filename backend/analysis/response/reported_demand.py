@@ -12,14 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from backend.analysis.response.path_fit import PathFit
+from backend.analysis.response.sampled_model import SampledFit, Sampler
 from backend.analysis.response.sampling import (
     USUAL_CURRENT_HZ,
     Hold,
     SignalPath,
+    delay_response,
     lag_response,
     sampled_command,
 )
-from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record
 from backend.analysis.thresholds import reported_demand as threshold
 
@@ -42,8 +44,13 @@ def demand_path(
     return at_once[0] if at_once[1] < threshold.CLEARLY * lagging[1] else None
 
 
-def with_acting_torque(record: Record, demand: SignalPath, corner_hz: float) -> Record:
+def with_acting_torque(
+    record: Record, demand: SignalPath, corner_hz: float, motion: SampledFit | None = None
+) -> Record:
     """Return the record with the torque that a current loop of this corner makes of the demand.
+
+    ``motion`` is an earlier fit: what is folded back of the loop's own part lags by more than its
+    line does.
 
     Raises:
         ValueError: the recording has no reported torque.
@@ -52,9 +59,9 @@ def with_acting_torque(record: Record, demand: SignalPath, corner_hz: float) -> 
         raise ValueError("the recording has no reported torque")
     sent = record.excitation.samples
     own = record.torque - sampled_command(sent, demand)
-    acting = replace(demand, current_bandwidth_hz=corner_hz)
+    acting = sampled_command(sent, replace(demand, current_bandwidth_hz=corner_hz))
     rate_hz = record.excitation.sample_rate_hz
-    return replace(record, torque=sampled_command(sent, acting) + _lagging(own, rate_hz, corner_hz))
+    return replace(record, torque=acting + _lagging(own, rate_hz, corner_hz, motion))
 
 
 def _fit(records: tuple[Record, ...], path: SignalPath, corner_hz: float) -> PathFit:
@@ -62,10 +69,24 @@ def _fit(records: tuple[Record, ...], path: SignalPath, corner_hz: float) -> Pat
     return PathFit.of(records, known, True, None)
 
 
-def _lagging(torque: FloatArray, rate_hz: float, corner_hz: float) -> FloatArray:
-    """A band-limited torque behind a lag; the ends are those of an axis at rest."""
+def _lagging(
+    torque: FloatArray, rate_hz: float, corner_hz: float, motion: SampledFit | None
+) -> FloatArray:
+    """A sampled torque behind a lag; the ends are those of an axis at rest."""
     padded = np.concatenate([np.full(torque.size, torque[0]), torque])
     spectrum = np.fft.rfft(padded - torque[0])
-    f = np.fft.rfftfreq(padded.size, 1.0 / rate_hz)
-    late = np.fft.irfft(spectrum * lag_response(f, corner_hz), padded.size)
+    f = np.fft.rfftfreq(padded.size, 1.0 / rate_hz)[1:]
+    lag = lag_response(f, corner_hz) if motion is None else _folded_lag(f, corner_hz, motion)
+    late = np.fft.irfft(spectrum * np.concatenate([[1.0], lag]), padded.size)
     return np.asarray(late[torque.size :] + torque[0])
+
+
+def _folded_lag(f: FloatArray, corner_hz: float, motion: SampledFit) -> ComplexArray:
+    """What a lag makes of the loop's own sampled torque, images included."""
+    path = replace(motion.path, current_bandwidth_hz=corner_hz)
+    sampler = Sampler.of(f, path, motion.loop)
+    whole = sampler.frequency_hz
+    plant = motion.model.response(whole) * delay_response(whole, motion.delay_s)
+    own = sampler.controller * plant * sampler.torque / (1.0 + sampler.controller * plant)
+    without = own / lag_response(whole, corner_hz)
+    return np.asarray(np.sum(own, axis=0) / np.sum(without, axis=0))

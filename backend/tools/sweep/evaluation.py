@@ -217,7 +217,9 @@ def _widened(
     """Widen the bands by what the drive does not report of its torque; with the warnings."""
     path, lines = found.fit.path, found.direct.frequency_hz
     said: list[Text] = []
-    if facts.current_bandwidth_hz is None and (commanded(path) or found.torque_is_demand):
+    if found.torque_is_demand:
+        said.append(_COMMANDED)
+    elif facts.current_bandwidth_hz is None and commanded(path):
         found = _charged(found, current_uncertainty(lines))
         said.append(_COMMANDED)
     corner = path.current_bandwidth_hz
