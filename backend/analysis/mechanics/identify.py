@@ -241,7 +241,7 @@ def _by_motion(
     a start: a search without a start converges slowly on a wrong path.
     """
     odd = _odd(task, paths[0], corner_known)
-    trials = []
+    trials: list[Trial] = []
     if not odd:
         task, trials = _with_true_speed(task, task.trials(paths), lambda t: t.trials(paths))
     if trials and not _suspect(task, trials[0], corner_known):
