@@ -147,6 +147,40 @@ class autotune_raising:
     """[dB] Origin: d16e3511."""
 
 
+class autotune_reference:
+    """`autotune/reference.py`."""
+
+    LOWEST_HZ = 5.0
+    """[Hz] Lowest line of a loop's response. Origin: 66bd184e."""
+    CORNERS_HZ = (40.0, 80.0, 160.0, 320.0, 640.0)
+    """[Hz] Corners that a reference is tried with; the first one is the usual. Origin:
+    benchmarks/rough_campaign."""
+    # CREST, CREST_SENT: Peak over root mean square of a sum of many lines with any phases, and of
+    # the reference itself, whose phases are chosen for a low one.
+    CREST = 3.5
+    """[ratio] Origin: benchmarks/rough_campaign."""
+    CREST_SENT = 1.7
+    """[ratio] Origin: benchmarks/rough_campaign."""
+    TORQUE_SHARE = 0.35
+    """[ratio] Peak of the predicted torque, of the permitted one: as the excitation that measured
+    the mechanics (`SweepSettings.share`). Origin: benchmarks/rough_campaign."""
+    # SPEED_SHARE, SPEED_RAD_S: Peak of the predicted speed, as that of the usual reference.
+    SPEED_SHARE = 0.15
+    """[ratio] Origin: 66bd184e."""
+    SPEED_RAD_S = 8.0
+    """[rad/s] Origin: 66bd184e."""
+    REFERENCE_SHARE = 0.3
+    """[ratio] Peak of the reference, of the permitted speed: next to the base motion a loop that
+    follows it better than predicted stays within the envelope. Origin:
+    benchmarks/rough_campaign."""
+    AS_LARGE = 0.9
+    """[ratio] No line is smaller than this share of the usual one. Origin:
+    benchmarks/rough_campaign."""
+    WORTH = 1.5
+    """[ratio] Lines at the last crossover must be so much larger. Origin:
+    benchmarks/rough_campaign."""
+
+
 class autotune_run:
     """`autotune/run.py`."""
 
@@ -229,6 +263,9 @@ class autotune_verify:
     """[rpm] Origin: ed1a5f9a with benchmarks/rough_campaign."""
     WORTH_A_STEP = 1.2
     """[ratio] Origin: ed1a5f9a with benchmarks/rough_campaign."""
+    RAISED_TORQUE = 0.8
+    """[ratio] Largest torque expected of a step with a raised gain, of the permitted one. Origin:
+    benchmarks/rough_campaign."""
     OVERSHOOT_PERCENT = 40.0
     """[%] Where there are fewer, a step may overshoot by this. Origin: 691daa5e with
     docs/tuning-accuracy.md."""
@@ -802,6 +839,11 @@ class measuring_alignment:
 class measuring_excite:
     """`measuring/excite.py`."""
 
+    # SPEED_CORNER_HZ, POSITION_CORNER_HZ: Above it the lines of a loop's reference fall.
+    SPEED_CORNER_HZ = 40.0
+    """[Hz] Origin: 66bd184e."""
+    POSITION_CORNER_HZ = 20.0
+    """[Hz] Origin: 66bd184e."""
     LOOP_CORNER_HZ = 60.0
     """[Hz] Below half of its own torque's share a line is lost in friction; above it, speed runs
     away. Origin: 76d84383."""

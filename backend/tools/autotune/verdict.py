@@ -85,16 +85,31 @@ def reported_lines(frf: Frf) -> Lines | None:
     In a slow loop they lie above its crossover: they show its gain and delay, but not the margins
     of that crossover.
     """
+    found = _every_sharp_line(frf)
+    return None if found is None else _up_to_gap(found)
+
+
+def _every_sharp_line(frf: Frf) -> Lines | None:
+    """Lines with a small standard deviation, beyond gaps as well; None where there are too few."""
     use = sharp(frf)
     f, closed = frf.frequency_hz[use], frf.response[use]
     if f.size < LINES:
         return None
     parts = (np.log(10.0) / 20.0 * frf.std_db[use], np.radians(frf.std_deg[use]))
-    deviation = np.sqrt(0.5 * sum(part**2 for part in parts))
-    gaps = np.flatnonzero(f[1:] > threshold.GAP * f[:-1])
+    return Lines(f, closed, np.asarray(np.sqrt(0.5 * sum(part**2 for part in parts))))
+
+
+def _up_to_gap(lines: Lines) -> Lines:
+    part = pieces(lines.frequency_hz)[0]
+    return Lines(lines.frequency_hz[part], lines.closed[part], lines.deviation[part])
+
+
+def pieces(frequency_hz: FloatArray) -> list[slice]:
+    """Parts of these lines without a gap. Between two of them the loop may turn either way."""
+    gaps = np.flatnonzero(frequency_hz[1:] > threshold.GAP * frequency_hz[:-1])
     # Below 20 Hz the lines of a linear grid are far apart anyway.
-    end = next((int(i) + 1 for i in gaps if f[i] > 20.0), f.size)
-    return Lines(f[:end], closed[:end], np.asarray(deviation)[:end])
+    ends = [int(i) + 1 for i in gaps if frequency_hz[i] > 20.0]
+    return [slice(a, b) for a, b in zip([0, *ends], [*ends, frequency_hz.size], strict=True)]
 
 
 def loops_of(
@@ -132,7 +147,8 @@ def verdict_of(
     alternatives = None
     if facts.motor_inertia_kgm2:
         alternatives = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
-    seen = reported_lines(frf)
+    # Delay and gain of the loop show on all lines, margins only without gaps between them.
+    seen = _every_sharp_line(frf)
     if seen is None:
         return judge(
             None, dense, every, nominal, shown_gain_db=shown_gain_db, alternatives=alternatives
@@ -149,7 +165,7 @@ def verdict_of(
     )
     found = [
         judge(
-            Lines(f, path.closed, seen.deviation),
+            _up_to_gap(Lines(f, path.closed, seen.deviation)),
             dense,
             every,
             nominal,

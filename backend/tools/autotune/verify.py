@@ -16,12 +16,14 @@ from backend.analysis.loop.margins import bandwidth, open_from_closed
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.sampling import Hold
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
 from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
+from backend.tools.autotune.reference import reference_for
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
     COHERENT,
@@ -32,6 +34,7 @@ from backend.tools.autotune.verdict import (
     WITHIN,
     in_words,
     misses,
+    pieces,
     sharp,
     sharp_lines,
     verdict_of,
@@ -125,6 +128,9 @@ async def verify(
     if check.home_raw is not None:
         await quiet(axis)
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
+    reference = await reference_for(
+        axis, session, check.envelope, check.facts, check.inertia_kgm2, check.plant, candidate
+    )
     settings = sweep_evaluation.SweepSettings(
         check.envelope,
         kind="speed_loop",
@@ -134,6 +140,8 @@ async def verify(
         pairs_before=check.pairs_before,
         rated_torque_nm=check.rated_torque_nm,
         coulomb_nm=check.coulomb_nm,
+        reference_rad_s=reference.peak_rad_s if reference else None,
+        reference_corner_hz=reference.corner_hz if reference else None,
     )
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
@@ -173,18 +181,28 @@ async def verify(
     step: step_evaluation.StepResult | None = None
     only_hums = False
     if why is None:
-        settings_of_step = _step_settings(check, candidate)
+        settings_of_step = usual = _step_settings(check, candidate)
         step = await step_response(axis, session, settings_of_step, stepping, keep)
+        steps = [step]
         larger = min(step_evaluation.significant_size(step), _largest_step(check, candidate))
         if step.widened and larger > threshold.WORTH_A_STEP * settings_of_step.size:
             settings_of_step = replace(settings_of_step, size=larger)
             step = await step_response(axis, session, settings_of_step, stepping, keep)
+            steps.append(step)
+        present = step
         hums, restless_why = hum(step), None if read else restless(step)
         why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
         only_hums = hums is not None and restless_why is None
         if why is None and open_above:
             most_db = raised_to(*known, verdict, guaranteed, open_above)
-            shown = await gain_steps(axis, session, settings_of_step, step, most_db, stepping)
+            # A raised gain takes more torque in the same step; at its limit it shows nothing.
+            share = _bearable(check, step, most_db)
+            if share < 1.0 and len(steps) > 1 and _bearable(check, steps[0], most_db) >= 1.0:
+                settings_of_step, present, share = usual, steps[0], 1.0
+            if share < 1.0:
+                settings_of_step = replace(settings_of_step, size=share * settings_of_step.size)
+                present = await step_response(axis, session, settings_of_step, stepping, keep)
+            shown = await gain_steps(axis, session, settings_of_step, present, most_db, stepping)
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
             why = _named(candidate, not_shown(verdict, guaranteed, shown, open_above))
     swept = replace(swept, margins=read)
@@ -224,7 +242,7 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
     f, closed = frf.frequency_hz[use], frf.response[use]
     if np.abs(closed[0]) < WITHIN:
         return {}
-    found = sweep_evaluation.margins_of(f, open_from_closed(closed))
+    found = _without_gaps(f, closed)
     if not isinstance(phase := found["phase_margin_deg"], float):
         return {}
     width = bandwidth(f, closed)
@@ -240,6 +258,29 @@ def sharp_margins(swept: sweep_evaluation.SweepResult) -> dict[str, float | bool
         "bandwidth_hz": width.minus_3db_hz,
         "bandwidth_90deg_hz": width.minus_90deg_hz,
     }
+
+
+def _without_gaps(f: FloatArray, closed: ComplexArray) -> dict[str, float | bool | None]:
+    """Margins on these lines; crossings between two that are far apart do not count.
+
+    There the lines are lost in an antiresonance, whose phase may turn either way between them: a
+    straight line from one to the other may pass the critical point where the loop does not.
+    """
+    whole = sweep_evaluation.margins_of(f, open_from_closed(closed))
+    parts = [part for part in pieces(f) if f[part].size > 1]
+    if len(parts) == 1 and f[parts[0]].size == f.size:
+        return whole
+    each = [sweep_evaluation.margins_of(f[p], open_from_closed(closed[p])) for p in parts]
+    crossovers = [m["crossover_hz"] for m in each if m["crossover_hz"] is not None]
+    found = whole | {"crossover_hz": crossovers[-1] if crossovers else None}
+    for name, at in (("phase_margin_deg", "phase_margin_hz"), ("gain_margin_db", "gain_margin_hz")):
+        least = min(
+            ((abs(v), m) for m in each if isinstance(v := m[name], float)),
+            key=lambda pair: pair[0],
+            default=None,
+        )
+        found |= {name: None, at: None} if least is None else {k: least[1][k] for k in (name, at)}
+    return found
 
 
 def restless(step: step_evaluation.StepResult) -> Text | None:
@@ -377,6 +418,13 @@ def _largest_step(check: Check, candidate: Candidate) -> float:
     torque_nm = envelope.torque_percent / 100.0 * check.facts.rated_torque_nm
     gentle = 0.5 * torque_nm / candidate.gains.speed_nms * 60.0 / (2 * np.pi)
     return float(min(0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle))
+
+
+def _bearable(check: Check, step: step_evaluation.StepResult, raised_db: float) -> float:
+    """Share of this step's size whose torque stays below the limit with so much more gain."""
+    highest = float(np.max(np.abs(step.torque_percent), initial=0.0)) * 10 ** (raised_db / 20.0)
+    limit = threshold.RAISED_TORQUE * check.envelope.torque_percent
+    return limit / highest if highest > limit else 1.0
 
 
 def _step_settings(check: Check, candidate: Candidate) -> step_evaluation.StepSettings:

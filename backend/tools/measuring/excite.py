@@ -20,6 +20,8 @@ from drivers.texts.message import Unsuitable, text
 
 FloatArray = npt.NDArray[np.float64]
 TURN = 2.0 * np.pi
+SPEED_CORNER_HZ = threshold.SPEED_CORNER_HZ
+POSITION_CORNER_HZ = threshold.POSITION_CORNER_HZ
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,7 @@ def loop_reference(
     Raises:
         ValueError: the limits do not suffice.
     """
-    corner = corner_hz or (20.0 if position else 40.0)
+    corner = corner_hz or (POSITION_CORNER_HZ if position else SPEED_CORNER_HZ)
 
     def size(f: FloatArray) -> FloatArray:
         falling = np.asarray(1.0 / np.hypot(1.0, f / corner))

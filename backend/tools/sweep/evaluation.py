@@ -88,6 +88,10 @@ class SweepSettings:
     """For a closed loop's response: pairs of realisations whose phases must not be used again."""
     odd_lines: bool = False
     """For mechanics by a multisine: odd lines only, which separate even and odd distortion."""
+    reference_rad_s: float | None = None
+    """For a speed loop's response: peak of the reference; None: by the inertia."""
+    reference_corner_hz: float | None = None
+    """For a speed loop's response: above it the lines of the reference fall; None: 40 Hz."""
 
 
 @dataclass(frozen=True)

@@ -169,11 +169,12 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
     try:
         if settings.kind != "mechanics":
             position = settings.kind == "position_loop"
-            amplitude, step = _reference_size(setup, position)
+            amplitude = settings.reference_rad_s or _reference_size(setup, position)
             return excite.loop_reference(
-                setup.rate, band, setup.room, step, amplitude=amplitude,
+                setup.rate, band, setup.room, 0.0, amplitude=amplitude,
                 realisations=settings.realisations, position=position, base=settings.base_motion,
-                waveform=settings.excitation, first=settings.pairs_before,
+                waveform=settings.excitation, corner_hz=settings.reference_corner_hz,
+                first=settings.pairs_before,
             )  # fmt: skip
         if setup.loop == "none":
             return excite.torque_mode(
@@ -200,12 +201,18 @@ def sequences_of(setup: Setup, settings: SweepSettings) -> tuple[excite.Sequence
         raise OutOfRange("sweep.envelope-not-allow-measurement", cause=reason_of(error)) from error
 
 
-def _reference_size(setup: Setup, position: bool) -> tuple[float, float]:
-    """Amplitude of a loop's reference (rad/s or rad), and its rounding step: 0, no rounding."""
-    speed = 0.15 * setup.room.speed_rad_s
+def _reference_size(setup: Setup, position: bool) -> float:
+    """Amplitude of a loop's reference (rad/s or rad)."""
+    corner = excite.POSITION_CORNER_HZ if position else excite.SPEED_CORNER_HZ
+    speed = reference_speed(setup.room, setup.rigid.inertia_kgm2, corner)
+    return speed / (_TURN * corner) if position else speed
+
+
+def reference_speed(
+    room: excite.Room, inertia_kgm2: float, corner_hz: float = excite.SPEED_CORNER_HZ
+) -> float:
+    """Amplitude of a loop's reference as a speed [rad/s], without a prediction of the loop."""
     # The torque for the acceleration at the corner must stay far below the limit, since lines and
     # resonances add up.
-    corner = _TURN * (20.0 if position else 40.0)
-    speed = min(speed, setup.room.torque_nm / 8.0 / setup.rigid.inertia_kgm2 / corner, 8.0)
-    size = speed / corner if position else speed
-    return size, 0.0
+    speed = 0.15 * room.speed_rad_s
+    return min(speed, room.torque_nm / 8.0 / inertia_kgm2 / (_TURN * corner_hz), 8.0)

@@ -18,7 +18,7 @@ from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import verify as tune_verify
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verdict import in_words, reported_lines, sharp_lines
+from backend.tools.autotune.verdict import in_words, pieces, reported_lines, sharp_lines
 from backend.tools.autotune.verify import (
     Check,
     Verified,
@@ -319,3 +319,55 @@ def test_a_crossover_that_no_line_shows_is_not_called_one_above_the_band() -> No
     assert unmeasured.code == "autotune.crossover-unmeasured"
     assert " 0 Hz" not in unmeasured.words()
     assert above.code == "autotune.crossover-above-measured"
+
+
+def antiresonant(phase_after_deg: float) -> SweepResult:
+    """A loop that crosses 0 dB at 25, 75 and 150 Hz, with its lines lost from 38 to 60 Hz.
+
+    The lines below the gap lag, those above it lead: between them the loop turns either way.
+    """
+    swept = loop_swept(1.0)
+    f = np.concatenate([np.arange(6.0, 37.0, 3.0), np.arange(62.0, 200.0, 4.0)])
+    below = f < 50.0
+    size = np.where(below, 25.0 / f, np.minimum((f / 75.0) ** 2, 150.0 / f))
+    turn = np.radians(np.where(below, -88.0 - 0.4 * f, phase_after_deg - 0.55 * f))
+    loop = size * np.exp(1j * turn)
+    same = np.ones(f.size)
+    frf = Frf(
+        f, loop / (1 + loop), 0.1 * same, same, 0.99 * same, same, same, 2000.0, (5.0, 400.0), 4, 0
+    )
+    return replace(swept, frf=frf)
+
+
+def test_a_crossing_between_lines_that_are_far_apart_is_not_read() -> None:
+    """A line drawn over an antiresonance may pass the critical point where the loop does not.
+
+    Where the amplitude is above 0 dB on one side of the gap and below on the other, the phase of
+    the crossing between them is not known, and the verdict predicts what lies there.
+    """
+    swept = antiresonant(135.0)
+    f = swept.frf.frequency_hz
+    for below_hz, above_hz in ((26.0, 60.0), (37.0, 80.0)):
+        # The loop falls through 0 dB in the gap, or rises through it.
+        use = (f < below_hz) | (f > above_hz)
+        frf = swept.frf
+        part = replace(
+            frf, frequency_hz=f[use], response=frf.response[use], std_db=frf.std_db[use],
+            std_deg=frf.std_deg[use], coherence=frf.coherence[use], noise=frf.noise[use],
+            distortion=frf.distortion[use],
+        )  # fmt: skip
+        found = sharp_margins(replace(swept, frf=part))
+        assert isinstance(found["phase_margin_deg"], float)
+        assert found["phase_margin_deg"] > 60.0
+        assert not any("phase" in each.code for each in worse_than(GUARANTEED, found))
+
+
+def test_lines_beyond_a_gap_tell_delay_and_gain_but_no_margins() -> None:
+    frf = antiresonant(135.0).frf
+    lines = reported_lines(frf)
+    assert lines is not None
+    assert lines.frequency_hz[-1] < 37.0
+    assert [f.size for f in (frf.frequency_hz[part] for part in pieces(frf.frequency_hz))] == [
+        11,
+        35,
+    ]
