@@ -239,6 +239,10 @@ class autotune_verdict:
     """[deg] Origin: 17b160fe."""
     LINES = 12
     """[count] Origin: 17b160fe."""
+    SHOWN_DEG = 20.0
+    """[deg] Up to this standard deviation a line counts, by its weight, for the delay and the gain
+    of a loop, which all lines share: its logarithm is still linear in its error. Origin:
+    benchmarks/rough_campaign."""
     GAP = 1.5
     """[ratio] The measured band ends where the next line is farther than this factor away. Origin:
     17b160fe."""

@@ -11,7 +11,7 @@ from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, Missed, judge
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.loop.notch import Notch
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.reference_path import reference_paths
+from backend.analysis.response.reference_path import ReferencePath, reference_paths
 from backend.analysis.response.sampling import Hold
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis
@@ -67,10 +67,15 @@ def sharp(frf: Frf) -> BoolArray:
 
     Lines without any scatter are of a single period as well.
     """
+    return _known_to(frf, BLURRED_DEG)
+
+
+def _known_to(frf: Frf, deg: float) -> BoolArray:
+    """Coherent lines whose standard deviation is known and at most this [n]."""
     known = np.isfinite(frf.std_db) & np.isfinite(frf.std_deg)
     known &= np.hypot(frf.std_db, frf.std_deg) > 0.0
     coherent = frf.in_band & (frf.coherence > COHERENT)
-    return np.asarray(known & coherent & (frf.std_deg <= BLURRED_DEG))
+    return np.asarray(known & coherent & (frf.std_deg <= deg))
 
 
 def sharp_lines(frf: Frf) -> Lines | None:
@@ -85,13 +90,13 @@ def reported_lines(frf: Frf) -> Lines | None:
     In a slow loop they lie above its crossover: they show its gain and delay, but not the margins
     of that crossover.
     """
-    found = _every_sharp_line(frf)
+    found = _lines(frf, BLURRED_DEG)
     return None if found is None else _up_to_gap(found)
 
 
-def _every_sharp_line(frf: Frf) -> Lines | None:
-    """Lines with a small standard deviation, beyond gaps as well; None where there are too few."""
-    use = sharp(frf)
+def _lines(frf: Frf, deg: float) -> Lines | None:
+    """Lines with a standard deviation up to this, beyond gaps too; None where there are too few."""
+    use = _known_to(frf, deg)
     f, closed = frf.frequency_hz[use], frf.response[use]
     if f.size < LINES:
         return None
@@ -147,35 +152,41 @@ def verdict_of(
     alternatives = None
     if facts.motor_inertia_kgm2:
         alternatives = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
-    # Delay and gain of the loop show on all lines, margins only without gaps between them.
-    seen = _every_sharp_line(frf)
-    if seen is None:
+
+    def judged(lines: Lines | None, path: ReferencePath | None) -> LoopVerdict:
         return judge(
-            None, dense, every, nominal, shown_gain_db=shown_gain_db, alternatives=alternatives
-        )
-    f = seen.frequency_hz
-    expected = loops(f, plant.on(f).response())
-    paths = reference_paths(
-        f,
-        seen.closed,
-        seen.deviation,
-        expected,
-        rate_hz=frf.sample_rate_hz,
-        hold=hold or ("linear" if facts.interpolates else "zero"),
-    )
-    found = [
-        judge(
-            _up_to_gap(Lines(f, path.closed, seen.deviation)),
+            lines,
             dense,
             every,
             nominal,
             shown_gain_db=shown_gain_db,
-            late_s=path.loop_late_s,
-            size=path.loop_size,
+            late_s=path.loop_late_s if path else None,
+            size=path.loop_size if path else None,
             alternatives=alternatives,
         )
-        for path in paths
-    ]
+
+    # Delay and gain of the loop show on all lines together, each by its deviation; margins only on
+    # sharp ones, without gaps between them.
+    shown = _lines(frf, threshold.SHOWN_DEG)
+    if shown is None:
+        return judged(None, None)
+    f = shown.frequency_hz
+    expected = loops(f, plant.on(f).response())
+    paths = reference_paths(
+        f,
+        shown.closed,
+        shown.deviation,
+        expected,
+        rate_hz=frf.sample_rate_hz,
+        hold=hold or ("linear" if facts.interpolates else "zero"),
+    )
+    clear = sharp(frf)[_known_to(frf, threshold.SHOWN_DEG)]
+    found = []
+    for path in paths:
+        lines = None
+        if np.count_nonzero(clear) >= LINES:
+            lines = _up_to_gap(Lines(f[clear], path.closed[clear], shown.deviation[clear]))
+        found.append(judged(lines, path))
     return min(found, key=lambda v: v.stated.phase_margin_deg)
 
 
