@@ -61,6 +61,9 @@ class autotune_gain_steps:
     STEP_DB = 2.5
     """[dB] Gains are raised in steps of this many dB, and the last one to what is asked for.
     Origin: 17b160fe."""
+    SURE_STEP_DB = 5.0
+    """[dB] The same up to a gain with which every possible loop is stable. Origin:
+    benchmarks/rough_campaign."""
     # QUIET_PERCENT, NOISE: Torque of a steady part, root mean square in % of the rated: this is
     # quiet, and noise may rise by the gain and this factor.
     QUIET_PERCENT = 1.5

@@ -57,9 +57,12 @@ async def gain_steps(
     wanted_db: float,
     progress: Progress,
     keep: Keep | None = None,
+    *,
+    surely_db: float = 0.0,
 ) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
 
+    Up to ``surely_db`` every loop that the axis may have is stable: fewer steps lead there.
     ``present`` is the same step at the unchanged gain. A step of which too many samples were lost
     shows nothing: no gain is raised further then.
 
@@ -74,8 +77,8 @@ async def gain_steps(
     now = await drive.raw(key)
     value = si_value(parameter, float(parameter.to_value(now)))
     done: list[GainStep] = []
-    count = steps_to(wanted_db)
-    for db in wanted_db * np.arange(1, count + 1) / count:
+    levels = levels_to(wanted_db, surely_db)
+    for db in levels:
         raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
         held = si_value(parameter, float(parameter.to_value(raw)))
         if not value or not held or held <= value * 1.01:
@@ -83,7 +86,7 @@ async def gain_steps(
         real_db = float(20.0 * np.log10(held / value))
         if done and real_db < done[-1].gain_db + 0.1:
             break
-        progress(len(done) / count, text("autotune.db-more-gain", real_db=real_db))
+        progress(len(done) / len(levels), text("autotune.db-more-gain", real_db=real_db))
         async with temporary(axis, {key: raw}):
             try:
                 step = await step_response(axis, session, settings, Progress(lambda: None), keep)
@@ -102,9 +105,23 @@ async def gain_steps(
     return GainSteps(max(shown, default=0.0), onset, tuple(done))
 
 
-def steps_to(wanted_db: float) -> int:
+def levels_to(wanted_db: float, surely_db: float = 0.0) -> list[float]:
+    """Raised gains up to ``wanted_db`` [dB], in larger steps up to ``surely_db``."""
+    surely_db = float(np.clip(surely_db, 0.0, wanted_db))
+    large = int(np.ceil(surely_db / threshold.SURE_STEP_DB))
+    # Where they save no step, all are equal.
+    rest = max(0 if large else 1, int(np.ceil((wanted_db - surely_db) / threshold.STEP_DB)))
+    usual = max(1, int(np.ceil(wanted_db / threshold.STEP_DB)))
+    if large + rest >= usual:
+        return [float(db) for db in wanted_db * np.arange(1, usual + 1) / usual]
+    first = surely_db * np.arange(1, large + 1) / large
+    then = surely_db + (wanted_db - surely_db) * np.arange(1, rest + 1) / max(rest, 1)
+    return [float(db) for db in (*first, *then)]
+
+
+def steps_to(wanted_db: float, surely_db: float = 0.0) -> int:
     """Number of raised gains up to ``wanted_db``."""
-    return max(1, int(np.ceil(wanted_db / threshold.STEP_DB)))
+    return len(levels_to(wanted_db, surely_db))
 
 
 def judged(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from backend.analysis.loop.design import Candidate
-from backend.analysis.loop.loop_goals import Goals
+from backend.analysis.loop.loop_goals import Goals, worst_of
 from backend.analysis.loop.loop_verdict import WORST_DB, LoopVerdict, Missed, excluding_db
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.axes.axis.axis import Axis
@@ -55,6 +55,35 @@ def raised_to(
         predicted.gain_margin_db.value - threshold.KEPT_BACK_DB, least + threshold.AT_ONCE_DB
     )
     return excludes if least < excludes <= most else least
+
+
+def surely_db(
+    axis: Axis,
+    facts: AxisFacts,
+    plant: MeasuredPlant | None,
+    candidate: Candidate,
+    verdict: LoopVerdict | None,
+) -> float:
+    """Up to which raise [dB] every loop that the axis may have is stable, with a reserve.
+
+    These are all plants of the design with the delay and gain that the lines leave open, and the
+    motor that decouples from its load above the measured band.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    predicted = verdict.predicted if verdict is not None else None
+    if plant is None or predicted is None or predicted.gain_margin_db is None:
+        return 0.0
+    least_db = predicted.gain_margin_db.low
+    if facts.motor_inertia_kgm2 is None:
+        # How light the motor is alone is not known.
+        return 0.0
+    alone = plant.motor_alone_above(facts.motor_inertia_kgm2)[None, :]
+    other = worst_of(loops_of(axis, facts, candidate, plant.frequency_hz, alone))
+    if not other.stable:
+        return 0.0
+    return max(min(least_db, other.gain_margin_db) - threshold.KEPT_BACK_DB, 0.0)
 
 
 def not_shown(

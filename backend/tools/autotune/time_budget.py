@@ -46,6 +46,10 @@ class TimeLeft:
         """Reserve time for this many raised gains."""
         self.raising_s = threshold.GAIN_STEP_S * steps
 
+    def allows(self, optional_s: float) -> bool:
+        """Whether there is time for something optional of this duration."""
+        return self.until_s - self.raising_s - time.monotonic() >= optional_s
+
     def verifications(self) -> float:
         """How many more verifications as long as the longest fit; infinite before the first."""
         if not self.longest_s or math.isinf(self.until_s):

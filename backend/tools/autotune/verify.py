@@ -22,7 +22,7 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
-from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to
+from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to, surely_db
 from backend.tools.autotune.reference import reference_for
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
@@ -154,7 +154,8 @@ async def verify(
     verdict = _verdict(axis, check, candidate, swept, None)
     above = tuple(each for each in _misses(verdict, guaranteed) if by_raised_gain(each))
     known = (axis, check.facts, check.plant, candidate)
-    clock.require_raising(steps_to(raised_to(*known, verdict, guaranteed, above)) if above else 0)
+    raised_db = raised_to(*known, verdict, guaranteed, above) if above else 0.0
+    clock.require_raising(steps_to(raised_db, surely_db(*known, verdict)) if above else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(guaranteed, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
@@ -182,10 +183,13 @@ async def verify(
     only_hums = False
     if why is None:
         settings_of_step = usual = _step_settings(check, candidate)
+        stepped_s = time.monotonic()
         step = await step_response(axis, session, settings_of_step, stepping, keep)
         steps = [step]
         larger = min(step_evaluation.significant_size(step), _largest_step(check, candidate))
-        if step.widened and larger > threshold.WORTH_A_STEP * settings_of_step.size:
+        wanted = step.widened and larger > threshold.WORTH_A_STEP * settings_of_step.size
+        # Without time for it the settling window stays as wide as the noise, and says so.
+        if wanted and clock.allows(time.monotonic() - stepped_s):
             settings_of_step = replace(settings_of_step, size=larger)
             step = await step_response(axis, session, settings_of_step, stepping, keep)
             steps.append(step)
@@ -202,7 +206,10 @@ async def verify(
             if share < 1.0:
                 settings_of_step = replace(settings_of_step, size=share * settings_of_step.size)
                 present = await step_response(axis, session, settings_of_step, stepping, keep)
-            shown = await gain_steps(axis, session, settings_of_step, present, most_db, stepping)
+            shown = await gain_steps(
+                axis, session, settings_of_step, present, most_db, stepping,
+                surely_db=surely_db(*known, verdict),
+            )  # fmt: skip
             verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
             why = _named(candidate, not_shown(verdict, guaranteed, shown, open_above))
     swept = replace(swept, margins=read)

@@ -8,6 +8,7 @@ frequencies. Nothing of it is shared with the judgement.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +16,11 @@ import pytest
 import scipy
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.gain_steps import GainStep, GainSteps, judged
+from backend.tools.autotune.gain_steps import GainStep, GainSteps, judged, levels_to
 from backend.tools.autotune.result import GainStepsInfo
 from backend.tools.measuring.figures import figures_of
 from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
+from backend.tools.thresholds import autotune_gain_steps as threshold
 
 FloatArray = npt.NDArray[np.float64]
 SETTINGS = StepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))
@@ -195,3 +197,23 @@ def test_a_step_that_the_drive_ended_is_part_of_the_result() -> None:
     shown = GainStepsInfo.model_validate(figures_of(ended))
     assert [each.oscillation_percent for each in shown.steps] == [0.4, None]
     assert shown.onset_db == 9.0
+
+
+@pytest.mark.parametrize(
+    ("wanted_db", "surely_db", "levels"),
+    [
+        (9.0, 0.0, [2.25, 4.5, 6.75, 9.0]),
+        (9.0, 20.0, [4.5, 9.0]),
+        (20.0, 12.0, [4.0, 8.0, 12.0, 14.0, 16.0, 18.0, 20.0]),
+        (6.0, 1.0, [2.0, 4.0, 6.0]),
+        (1.5, 0.0, [1.5]),
+    ],
+)
+def test_gains_that_no_possible_loop_is_unstable_with_are_passed_in_larger_steps(
+    wanted_db: float, surely_db: float, levels: list[float]
+) -> None:
+    found = levels_to(wanted_db, surely_db)
+    assert found == pytest.approx(levels)
+    # Beyond them each raise is as small as without them.
+    beyond = [b - a for a, b in pairwise([0.0, *found]) if b > surely_db + 1e-9]
+    assert max(beyond, default=0.0) <= threshold.STEP_DB + 1e-9
