@@ -128,4 +128,4 @@ def _each(plant: MeasuredPlant, frequency_hz: FloatArray) -> ComplexArray:
         rows.append(
             np.interp(log_f, log_dense, turns.real) + 1j * np.interp(log_f, log_dense, turns.imag)
         )
-    return np.exp(np.array(rows))
+    return np.asarray(np.exp(np.array(rows)))

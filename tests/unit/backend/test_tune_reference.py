@@ -1,4 +1,4 @@
-"""The reference that measures a tuned loop: as large as the axis bears, by the loop's prediction."""
+"""The reference that measures a tuned loop: as large as the axis bears in the predicted loop."""
 
 from __future__ import annotations
 
