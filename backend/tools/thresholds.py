@@ -246,6 +246,12 @@ class autotune_verdict:
     """[deg] Up to this standard deviation a line counts, by its weight, for the delay and the gain
     of a loop, which all lines share: its logarithm is still linear in its error. Origin:
     benchmarks/rough_campaign."""
+    # COMMON_LATE_S, COMMON_SIZE: What all lines of such a loop may be off by together, one
+    # deviation: on two axes whose loops are as predicted the delay was found 80 µs too short.
+    COMMON_LATE_S = 40e-6
+    """[s] Origin: benchmarks/rough_campaign."""
+    COMMON_SIZE = 0.03
+    """[log] Origin: benchmarks/rough_campaign."""
     GAP = 1.5
     """[ratio] The measured band ends where the next line is farther than this factor away. Origin:
     17b160fe."""

@@ -154,14 +154,19 @@ def verdict_of(
         alternatives = loops(dense, plant.motor_alone_above(facts.motor_inertia_kgm2))[None, :]
 
     def judged(lines: Lines | None, path: ReferencePath | None) -> LoopVerdict:
+        late_s, size = (path.loop_late_s, path.loop_size) if path else (None, None)
+        if lines is None and late_s is not None and size is not None:
+            # Many blurred lines average their noise, but not what all of them are off by.
+            late_s = (late_s[0], float(np.hypot(late_s[1], threshold.COMMON_LATE_S)))
+            size = (size[0], float(np.hypot(size[1], threshold.COMMON_SIZE)))
         return judge(
             lines,
             dense,
             every,
             nominal,
             shown_gain_db=shown_gain_db,
-            late_s=path.loop_late_s if path else None,
-            size=path.loop_size if path else None,
+            late_s=late_s,
+            size=size,
             alternatives=alternatives,
         )
 
