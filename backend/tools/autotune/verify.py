@@ -200,8 +200,8 @@ async def verify(
         if why is None and open_above:
             most_db = raised_to(*known, verdict, guaranteed, open_above)
             # A raised gain takes more torque in the same step; at its limit it shows nothing.
-            share = _bearable(check, step, most_db)
-            if share < 1.0 and len(steps) > 1 and _bearable(check, steps[0], most_db) >= 1.0:
+            share = bearable(check, step, most_db)
+            if share < 1.0 and len(steps) > 1 and bearable(check, steps[0], most_db) >= 1.0:
                 settings_of_step, present, share = usual, steps[0], 1.0
             if share < 1.0:
                 settings_of_step = replace(settings_of_step, size=share * settings_of_step.size)
@@ -427,7 +427,7 @@ def _largest_step(check: Check, candidate: Candidate) -> float:
     return float(min(0.3 * envelope.speed_rpm, 120.0 * envelope.travel_rev, gentle))
 
 
-def _bearable(check: Check, step: step_evaluation.StepResult, raised_db: float) -> float:
+def bearable(check: Check, step: step_evaluation.StepResult, raised_db: float) -> float:
     """Share of this step's size whose torque stays below the limit with so much more gain."""
     highest = float(np.max(np.abs(step.torque_percent), initial=0.0)) * 10 ** (raised_db / 20.0)
     limit = threshold.RAISED_TORQUE * check.envelope.torque_percent

@@ -22,6 +22,7 @@ from backend.tools.autotune.verdict import in_words, pieces, reported_lines, sha
 from backend.tools.autotune.verify import (
     Check,
     Verified,
+    bearable,
     hum,
     otherwise,
     sharp_margins,
@@ -65,6 +66,22 @@ def test_samples_that_were_not_received_do_not_calm_it() -> None:
     assert before is not None
     assert found is not None
     assert found.params["rms_percent"] == pytest.approx(before.params["rms_percent"], rel=0.2)
+
+
+@pytest.mark.parametrize(("raised_db", "share"), [(0.0, 1.0), (4.0, 1.0), (9.0, 0.568)])
+def test_a_step_with_more_gain_stays_below_the_torque_limit(raised_db: float, share: float) -> None:
+    """A torque of 50 % is 141 % with 9 dB more: the limit would end the step, stable or not."""
+    facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
+    check = Check(Envelope(4.0, 1500.0, 100.0, 60.0), facts, 1e-4, None, None, None)
+    assert bearable(check, step(0.1), raised_db) == pytest.approx(share, rel=0.01)
+
+
+def test_what_is_optional_takes_no_time_that_raised_gains_need() -> None:
+    assert TimeLeft().allows(100.0)
+    left = TimeLeft.of(10.0)
+    assert left.allows(8.0)
+    left.require_raising(2)
+    assert not left.allows(8.0)
 
 
 def test_margins_as_promised_are_kept() -> None:
