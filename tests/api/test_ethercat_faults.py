@@ -95,7 +95,7 @@ class Segment:
 
         def calm() -> bool:
             # The states first: a drive's first answer after its return begins the job that reads
-            # it anew and restores what a motion left changed; until that ends, nothing may move.
+            # it again and restores what a motion left changed; until that ends, nothing may move.
             states = [self.station.state(drive) for drive in (self.a, self.b)]
             jobs = self.station.ok(self.station.http.get("/jobs"))
             asked = all(datetime.fromisoformat(state["time"]) > now for state in states)

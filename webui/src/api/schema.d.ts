@@ -44013,7 +44013,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description Too often */
+            /** @description Too many requests */
             429: {
                 headers: {
                     [name: string]: unknown;
@@ -44022,7 +44022,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The answer makes no sense */
+            /** @description Invalid answer */
             502: {
                 headers: {
                     [name: string]: unknown;
@@ -44031,7 +44031,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
-            /** @description The link is gone */
+            /** @description Link lost */
             503: {
                 headers: {
                     [name: string]: unknown;
