@@ -287,6 +287,8 @@ class Envelope:
     For an axis held by its closed brake, where a quick stop would push against the brake, and for
     pulses to a motor whose phases are not yet known, where a quick stop would close a loop.
     """
+    stopped_if_it_runs_on: bool = False
+    """With ``torque_off_only``: a shaft that no brake slows down is stopped by a quick stop."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ def motion_of(trajectory: Trajectory, cycle_s: float) -> Motion:
             envelope.following_error_max,
             envelope.feedback,
             envelope.torque_off_only,
+            envelope.stopped_if_it_runs_on,
         ),
         renew_cycles=max(1, math.ceil(trajectory.renew_s / cycle_s)),
         longest_step=longest_step(trajectory),

@@ -12,7 +12,8 @@ coast.
 
 With a closed brake, a torque beyond a limit only becomes zero, and the power is removed `LET_GO_S`
 later: a quick stop by a velocity loop would keep pushing (R6L, EP3E and M6-L take 50 ms to 1 s for
-it).
+it). Where the limits say so, a shaft that has not slowed down `RUNS_ON_S` after the torque, as its
+brake let go altogether, gets a quick stop after all.
 """
 
 from __future__ import annotations
@@ -50,6 +51,15 @@ STOP_S = 0.1
 """Ramp time from any speed to standstill [s]; below the 200 ms in which lost setpoints must end."""
 LET_GO_S = 0.05
 """Delay until the power of an axis held by its closed brake, with zero torque, is removed [s]."""
+RUNS_ON_S = 0.012
+"""Delay after a torque became zero, until which a brake that still holds has slowed the shaft [s].
+
+With the torque gone after 3 ms, a brake with a fifth of it takes half of the speed in this time.
+Not less than `_RUNS_ON_CYCLES`, for the delay of bus and drive.
+"""
+_RUNS_ON_CYCLES = 5
+_SLOWED = 0.5
+"""Share of the speed at the limit below which the shaft counts as slowed down."""
 
 _RESTLESS = 2
 """Encoder noise of an axis at standstill, in increments per cycle."""
@@ -137,6 +147,7 @@ class AxisLoop:
         self._after_brake = State.READY
         self._after_quick_stop = State.READY
         self._let_go_at: int | None = None
+        self._runs_on_at: int | None = None
         self._was_enabled = False
         self._stale = 0
         self._last_position: int | None = None
@@ -248,6 +259,9 @@ class AxisLoop:
             self._brake_target = TORQUE
             if motion.limits.torque_off_only and why.cause in ENVELOPE_CAUSES:
                 self._let_go_at = self._cycles + max(1, round(LET_GO_S / self._cycle_s))
+                if motion.limits.stopped_if_it_runs_on:
+                    cycles = max(_RUNS_ON_CYCLES, round(RUNS_ON_S / self._cycle_s))
+                    self._runs_on_at, self._moved_at_stop = self._cycles + cycles, self._moved
                 return
             self.goal = State.QUICK_STOP_ACTIVE
             self._after_quick_stop = goal
@@ -491,6 +505,15 @@ class AxisLoop:
 
     def _control(self) -> None:
         place = self._out[CONTROL]
+        if self._runs_on_at is not None and self._cycles >= self._runs_on_at:
+            self._runs_on_at = None
+            runs_on = self._moved > max(_SLOWED * self._moved_at_stop, _RESTLESS)
+            if runs_on and self.goal is State.OPERATION_ENABLED and self.phase is Phase.IDLE:
+                self._let_go_at = None
+                self.goal, self._after_quick_stop = (
+                    State.QUICK_STOP_ACTIVE,
+                    State.SWITCH_ON_DISABLED,
+                )
         if self._let_go_at is not None and self._cycles >= self._let_go_at:
             self._let_go_at = None
             if self.goal is State.OPERATION_ENABLED and self.phase is Phase.IDLE:

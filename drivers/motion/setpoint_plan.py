@@ -42,6 +42,8 @@ class Limits:
     feedback: FeedbackScale | None = None
     torque_off_only: bool = False
     """Beyond a limit a torque only becomes zero, without a quick stop."""
+    stopped_if_it_runs_on: bool = False
+    """With ``torque_off_only``: a quick stop follows where the shaft does not slow down."""
 
     def require_watched(self, inputs: Container[int], where: Text, target: int = POSITION) -> None:
         """Check that the actual value of each limit is among these objects of the cyclic data.

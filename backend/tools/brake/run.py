@@ -2,7 +2,7 @@
 
 At the slip limit, the cyclic loop of the exchange itself ends the test, in the cycle after the
 sample that exceeds it: it sets the torque to zero, followed by a quick stop
-(`drivers.motion.playback`).
+where no brake slows the shaft down (`drivers.motion.playback`).
 """
 
 from __future__ import annotations
@@ -119,7 +119,9 @@ async def run(run: Run, settings: BrakeSettings) -> BrakeResult:
     await quiet(axis)
     means: Means = "supply" if settings.brake_supply_cut else "output"
     trials: list[Trial] = []
-    async with _closed(axis, settings), stopping_hard(axis, settings.speed_limit):
+    # A shaft whose brake lets go under torque is faster than the limit before it is braked.
+    fastest = max(settings.speed_limit, facts.rated_speed_rpm or 0.0)
+    async with _closed(axis, settings), stopping_hard(axis, fastest):
         for number, direction in enumerate(_DIRECTIONS):
             trial = await _trial(run, settings, facts, units, direction, percent, number)
             trials.append(trial)
@@ -231,7 +233,7 @@ async def _trial(
     """Test one direction: a preload, which shows whether the brake is closed at all, then the ramp.
 
     Beyond a limit, the preload ends with a quick stop, as an open brake does not hold. Later only
-    the torque becomes zero.
+    the torque becomes zero; a quick stop follows where the shaft does not slow down.
     """
     axis, session = run.axis, run.session
     rate = 1.0 / cycle_s(session)
@@ -246,7 +248,7 @@ async def _trial(
         for part, closed in ((slice(0, begins), False), (slice(begins, None), True)):
             low = 0.05 + 0.45 * number + (0.2 if closed else 0.0)
             done = share(run.progress, low, low + 0.22, step)
-            bounds = replace(limits, torque_off_only=closed)
+            bounds = replace(limits, torque_off_only=closed, stopped_if_it_runs_on=closed)
             catch, halted = await _played(run, facts, raw[part], bounds, done)
             parts.append(_placed(catch, raw[part], phases[part], units, facts, direction, halted))
             if halted:

@@ -104,10 +104,16 @@ async def test_the_shaft_itself_after_the_limit_was_passed() -> None:
     assert gone - passed <= 20.0
 
 
-async def test_a_brake_that_lets_go_altogether_is_not_tested_in_the_other_direction() -> None:
-    """It opens at 90 % of the rated torque and does not close again: the shaft coasts."""
+@pytest.mark.parametrize(("drive", "furthest_rev"), [("r6l", 0.2), ("ep3e", 0.5)])
+async def test_a_shaft_is_stopped_where_the_brake_lets_go_altogether(
+    drive: str, furthest_rev: float
+) -> None:
+    """It opens at 90 % of the rated torque and does not close again; one direction is tested.
+
+    In torque modes the quick stop of an EP3E only lets the torque fall (6087h): the shaft coasts.
+    """
     spec = braked(2.0 * RATED_NM, windup_rev=WINDUP_REV, supplied=False)
-    async with direct(spec, drive="ep3e") as bench:
+    async with direct(spec, drive=drive) as bench:
         core = bench.link.device.axis  # type: ignore[attr-defined]
         advance = bench.link.device.advance
         opened = []
@@ -121,11 +127,14 @@ async def test_a_brake_that_lets_go_altogether_is_not_tested_in_the_other_direct
         bench.link.device.advance = watched  # type: ignore[method-assign]
         found = await brake_of(bench.axis, bench.session, CUT)
         assert await bench.axis.state() is not State.OPERATION_ENABLED
+        turned_rev = abs(core._x[0]) / (2 * math.pi)
+        assert abs(core._x[1]) < 0.1 * 2 * math.pi
     assert opened
+    assert turned_rev < furthest_rev
     assert found.verdict == "slipped"
     (way,) = found.ways
     assert way.direction == 1
-    assert way.travel_rev > 0.1
+    assert 0.05 < way.travel_rev < furthest_rev
     assert way.abort_ms is not None
     assert way.abort_ms <= 20.0
 

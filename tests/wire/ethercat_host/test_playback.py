@@ -11,7 +11,7 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.feedback import FeedbackScale
 from drivers.halt import HaltCause, Halted, LeftBy
-from drivers.motion.playback import LET_GO_S, STOP_S, AxisLoop
+from drivers.motion.playback import LET_GO_S, RUNS_ON_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
@@ -291,6 +291,30 @@ def test_against_a_closed_brake_a_torque_beyond_a_limit_only_becomes_zero() -> N
     assert 0x02 not in words
     assert bench.axis.state is State.SWITCH_ON_DISABLED
     assert bench.axis.outputs[3] == 0
+
+
+@pytest.mark.parametrize(("slows_to", "stopped"), [(0.9, True), (0.3, False), (0.0, False)])
+def test_a_shaft_that_no_brake_slows_down_gets_a_quick_stop(slows_to: float, stopped: bool) -> None:
+    bench = Bench().enabled(mode=10)
+    limits = Limits(position_max=600, torque_off_only=True, stopped_if_it_runs_on=True)
+    bench.play([100] * 1000, target=0x6071, limits=limits)
+    speed = 40
+    bench.position = 561
+    bench.step(3)
+    bench.position += speed
+    bench.step()
+    assert bench.axis.outputs[3] == 0
+    words = []
+    for cycle in range(1, 2 * round(LET_GO_S / CYCLE_S)):
+        bench.position += round(speed * (1.0 - (1.0 - slows_to) * min(cycle / 10, 1.0)))
+        bench.step()
+        words.append(bench.axis.outputs[0])
+    if stopped:
+        assert words.index(0x02) == pytest.approx(RUNS_ON_S / CYCLE_S, abs=2)
+        assert 0x00 not in words
+    else:
+        assert words.index(0x00) == pytest.approx(LET_GO_S / CYCLE_S, abs=2)
+        assert 0x02 not in words
 
 
 def test_against_a_closed_brake_every_other_end_is_a_quick_stop() -> None:
