@@ -58,9 +58,12 @@ class Product:
     def running(self, *words: str) -> Iterator[subprocess.Popen[str]]:
         """Have one command run meanwhile."""
         process = subprocess.Popen(
-            self._command(words), env=self._environment(), stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True,
-        )  # fmt: skip
+            self._command(words),
+            env=self._environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
         try:
             yield process
         finally:
@@ -88,8 +91,9 @@ def built(source: Path, headers: Path, folder: Path) -> Path:
     )  # fmt: skip
     subprocess.run(
         ["cmake", "--build", folder / "build", "--target", "network_simulator", "-j2"],
-        check=True, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
     return folder / "build" / "simulation" / "network_simulator"
 
 

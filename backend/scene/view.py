@@ -32,8 +32,11 @@ _ROD, _LIMIT, _HOME = (190, 196, 204), (200, 40, 40), (40, 120, 210)
 Look = Literal["on", "off", "fault", "unknown"]
 #: Colours as on the page for the same states; the sign shows the state as well.
 COLOURS: dict[Look, tuple[int, int, int]] = {
-    "on": (40, 150, 70), "off": (120, 126, 136), "fault": (200, 40, 40), "unknown": (120, 126, 136),
-}  # fmt: skip
+    "on": (40, 150, 70),
+    "off": (120, 126, 136),
+    "fault": (200, 40, 40),
+    "unknown": (120, 126, 136),
+}
 SIGNS: dict[Look, str] = {"on": "I", "off": "O", "fault": "!", "unknown": "?"}
 _ALONG_X = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 _ALONG_Y = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)

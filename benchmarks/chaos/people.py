@@ -372,8 +372,9 @@ class Person:
 
     async def record(self, axis: int) -> None:
         channels = [{"drive": self.drives[axis], "key": "6064:00"}]
-        answer = await self.ask("POST", "/recordings", "record",
-                                json={"channels": channels, "duration_s": 5})  # fmt: skip
+        answer = await self.ask(
+            "POST", "/recordings", "record", json={"channels": channels, "duration_s": 5}
+        )
         if answer is not None and answer.is_success and self.random.random() < 0.5:
             await asyncio.sleep(0.5)
             await self.ask("POST", f"/recordings/{answer.json()['name']}/stop", "end recording")
@@ -401,16 +402,20 @@ class Person:
         values = {key: {"raw": raw} for key, raw in spec.energising}
         if self.random.random() < 0.5:
             for key, value in values.items():
-                answer = await self.ask("PUT", f"/drives/{drive}/parameters/{key}", "energise",
-                                        json=value)  # fmt: skip
+                answer = await self.ask(
+                    "PUT", f"/drives/{drive}/parameters/{key}", "energise", json=value
+                )
                 if answer is not None and answer.is_success:
                     self.judge.violated(f"{spec.name}: {key} was written as a parameter")
             return
-        answer = await self.ask("PUT", f"/drives/{drive}/parameters", "energise all",
-                                json={"values": values})  # fmt: skip
-        written = [] if answer is None or not answer.is_success else [
-            row["key"] for row in answer.json() if row["ok"]
-        ]  # fmt: skip
+        answer = await self.ask(
+            "PUT", f"/drives/{drive}/parameters", "energise all", json={"values": values}
+        )
+        written = (
+            []
+            if answer is None or not answer.is_success
+            else [row["key"] for row in answer.json() if row["ok"]]
+        )
         if written:
             self.judge.violated(f"{spec.name}: {written} were written as parameters")
 
@@ -486,8 +491,9 @@ class Guest(Person):
     """Somebody from elsewhere, by invitation."""
 
     def __init__(self, host: Person, link: str, code: str) -> None:
-        super().__init__(f"Guest of {host.name}", host.station, host.judge, host.random,
-                         host.tally, host.say)  # fmt: skip
+        super().__init__(
+            f"Guest of {host.name}", host.station, host.judge, host.random, host.tally, host.say
+        )
         self._invited = {"link": link, "code": code}
 
     async def log_in(self, http: httpx.AsyncClient) -> bool:

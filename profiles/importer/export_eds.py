@@ -185,10 +185,13 @@ def _object(
     counted = [p for p in members if p.subindex]
     count = pdos.counts.get(index, counted[-1].subindex or 0)
     lines = [
-        f"[{index:04X}]", f"ParameterName={_text(title)}", f"ObjectType=0x{_RECORD:X}",
-        f"SubNumber={len(counted) + 1}", "",
+        f"[{index:04X}]",
+        f"ParameterName={_text(title)}",
+        f"ObjectType=0x{_RECORD:X}",
+        f"SubNumber={len(counted) + 1}",
+        "",
         f"[{index:04X}sub0]",
-    ]  # fmt: skip
+    ]
     own = next((p for p in members if not p.subindex), None)
     if own is not None:
         # The number of mapped objects (1600h, 1C12h) can be written.

@@ -53,8 +53,10 @@ class Computer:
         """Change something in the namespace."""
         subprocess.run(
             self._network.command([sys.executable, "-c", script]),
-            cwd=ROOT, env=child_environment(), check=True,
-        )  # fmt: skip
+            cwd=ROOT,
+            env=child_environment(),
+            check=True,
+        )
 
     def found(self, interface: str = "ec0m", without: str = "") -> list[str]:
         """Codes of the findings, in their order."""

@@ -141,10 +141,13 @@ def raw(server: GuardedServer, head: str, body: bytes) -> bytes:
 
 @pytest.mark.parametrize(
     "framing",
-    ["Content-Length: 30\r\nTransfer-Encoding: chunked", "Content-Length: 5\r\nContent-Length: 6",
-     "Transfer-Encoding: chunked\r\nContent-Length: 5",
-     "Transfer-Encoding: chunked\r\nTransfer-Encoding: identity"],
-)  # fmt: skip
+    [
+        "Content-Length: 30\r\nTransfer-Encoding: chunked",
+        "Content-Length: 5\r\nContent-Length: 6",
+        "Transfer-Encoding: chunked\r\nContent-Length: 5",
+        "Transfer-Encoding: chunked\r\nTransfer-Encoding: identity",
+    ],
+)
 @pytest.mark.parametrize("path", ["/stop", "/session"])
 def test_a_body_with_two_ends_is_refused(
     server: GuardedServer, cast: Cast, path: str, framing: str

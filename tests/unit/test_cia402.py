@@ -101,8 +101,11 @@ def test_states_have_the_names_of_the_term_base() -> None:
 
 def test_a_refused_state_is_named_in_the_readers_language() -> None:
     refused = text(
-        "axis.stays-not-go", drive="X", why=text("axis.cause-none"),
-        state=state_text(State.FAULT), goal=state_text(State.OPERATION_ENABLED),
-    )  # fmt: skip
+        "axis.stays-not-go",
+        drive="X",
+        why=text("axis.cause-none"),
+        state=state_text(State.FAULT),
+        goal=state_text(State.OPERATION_ENABLED),
+    )
     assert "“Fault”" in refused.words("en")
     assert "“故障（Fault）”" in refused.words("zh")

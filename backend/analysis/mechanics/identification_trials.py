@@ -307,6 +307,9 @@ def mode_uncertainties_of(trial: Trial, uncertainty: Uncertainty) -> tuple[ModeU
         for v in given
     ]
     return mode_uncertainties(
-        trial.solution.problem, trial.solution.x, uncertainty.covariance, together,
+        trial.solution.problem,
+        trial.solution.x,
+        uncertainty.covariance,
+        together,
         friction_seen=trial.views.velocity.coulomb_nm > 0,
-    )  # fmt: skip
+    )

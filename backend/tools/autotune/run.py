@@ -309,9 +309,12 @@ def _require_torque(axis: Axis, mechanics: sweep_evaluation.SweepResult) -> None
 
 
 async def _design(
-    axis: Axis, session: CyclicSession, settings: AutotuneSettings, facts: AxisFacts,
+    axis: Axis,
+    session: CyclicSession,
+    settings: AutotuneSettings,
+    facts: AxisFacts,
     found: AutotuneResult,
-) -> Design:  # fmt: skip
+) -> Design:
     """The candidates, from the measured response.
 
     Raises:
@@ -326,8 +329,11 @@ async def _design(
         look = joined([*found.mechanics.warnings, text("autotune.look-at-mechanics")])
         raise NotAllowed(
             "autotune.no-careful-safe-either",
-            drive=drive.name, remedy=look, caution=made.caution, detail=look,
-        )  # fmt: skip
+            drive=drive.name,
+            remedy=look,
+            caution=made.caution,
+            detail=look,
+        )
     return made
 
 
@@ -379,10 +385,13 @@ async def apply_and_verify(
     verified = applied.verified
     twice = again.reported(verified) if again else None
     said = (
-        None if verified.sweep.margins else _BY_STEP, trials.note(applied), clock.reported(), twice,
+        None if verified.sweep.margins else _BY_STEP,
+        trials.note(applied),
+        clock.reported(),
+        twice,
         None if again and not again.verified_anew else otherwise(verified),
         unseen(applied.candidate.nominal.crossover_hz, verified),
-    )  # fmt: skip
+    )
     if twice is not None:
         # Attached to the measurement too, for readers who see it without the tuning.
         warnings = (*verified.sweep.warnings, twice)

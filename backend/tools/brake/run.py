@@ -257,9 +257,12 @@ async def _trial(
 
 
 async def _played(
-    run: Run, facts: AxisFacts, raw: npt.NDArray[np.int64], limits: bus.Envelope,
+    run: Run,
+    facts: AxisFacts,
+    raw: npt.NDArray[np.int64],
+    limits: bus.Envelope,
     progress: Callable[[float], None],
-) -> tuple[_Catch, bool]:  # fmt: skip
+) -> tuple[_Catch, bool]:
     """Play the setpoints: what was received, and whether a limit of travel or speed ended it."""
     axis, session, drive = run.axis, run.session, run.axis.drive
     keys = [drive.require(role) for role in ("position_actual", "torque_actual", "torque_target")]
@@ -304,9 +307,12 @@ def _placed(
     return Trial(
         direction=direction,
         position_rad=values[:, 0] * (units.position(1.0) * 2 * np.pi),
-        torque_nm=values[:, 1] * nm, sent_nm=values[:, 2] * nm,
-        phase=phases[np.clip(row, 0, len(raw) - 1)], valid=valid, halted=halted,
-    )  # fmt: skip
+        torque_nm=values[:, 1] * nm,
+        sent_nm=values[:, 2] * nm,
+        phase=phases[np.clip(row, 0, len(raw) - 1)],
+        valid=valid,
+        halted=halted,
+    )
 
 
 def _begun(

@@ -262,10 +262,12 @@ def _points(
         )
         points.append(
             FrictionPoint(
-                speed_rpm=float(np.mean([each.rpm for each in same])), torque_percent=torque,
-                torque_ci95_percent=(torque - half, torque + half), revolutions=turns,
+                speed_rpm=float(np.mean([each.rpm for each in same])),
+                torque_percent=torque,
+                torque_ci95_percent=(torque - half, torque + half),
+                revolutions=turns,
             )
-        )  # fmt: skip
+        )
     return sorted(points, key=lambda point: point.speed_rpm)
 
 

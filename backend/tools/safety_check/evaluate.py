@@ -274,9 +274,12 @@ class _Check:
         free = self._last_above(self._torque, self._noise, max(0, at - round(0.05 * rate)))
         distinct = torque >= threshold.DISTINCT * self._noise
         found: dict[str, object] = {
-            "sign": self._sign, "speed_rpm": speed, "torque_before_percent": torque,
-            "watched_ms": 1e3 * (self._speed.size - at) / rate, **self._shown(at),
-        }  # fmt: skip
+            "sign": self._sign,
+            "speed_rpm": speed,
+            "torque_before_percent": torque,
+            "watched_ms": 1e3 * (self._speed.size - at) / rate,
+            **self._shown(at),
+        }
         if rest is not None:
             way = abs(float(self._trace.position_rev[rest] - self._trace.position_rev[at]))
             found |= {"stop_ms": 1e3 * (rest - at) / rate, "stop_rev": way}
@@ -347,10 +350,12 @@ class _Check:
         if torque_off and left.size and bool(np.any(self._trace.enabled[at + int(left[0]) :])):
             return "restarted"
         if (
-            settings.function == "ss1" and free is not None and distinct
+            settings.function == "ss1"
+            and free is not None
+            and distinct
             and obstacle != "quick_stop_cut"
             and abs(float(self._speed[free])) > threshold.AT_STANDSTILL * abs(speed)
-        ):  # fmt: skip
+        ):
             return "power_off_at_speed"
         if exceeded:
             return "beyond_limits"

@@ -218,10 +218,13 @@ def _ways(
         for number, goal in enumerate((float(demand[-1]), 0.0)):
             begin = lead + number * one + demand.size
             part = slice(begin, begin + hold)
-            signals = np.column_stack([
-                goal - rev[part], pair.velocity_rad_s[part] * 60.0 / _TURN,
-                pair.torque_nm[part] / moves.rated_torque_nm * 100.0,
-            ])  # fmt: skip
+            signals = np.column_stack(
+                [
+                    goal - rev[part],
+                    pair.velocity_rad_s[part] * 60.0 / _TURN,
+                    pair.torque_nm[part] / moves.rated_torque_nm * 100.0,
+                ]
+            )
             valid = pair.valid[part]
             if valid.size == hold and np.mean(valid) >= threshold.SEEN:
                 found.append(RingDown(signals, valid, moves.rate))
@@ -250,9 +253,12 @@ def evaluate(moves: Moves, settings: ShapingSettings, seen: Seen | None) -> Shap
         unit=None if seen is None else UNITS[SIGNALS[seen.signal]],
         mode=None if seen is None else seen.found,
         shapers=() if band is None else tuple(_described(each, band, left) for each in made),
-        chosen=None if chosen is None else chosen.kind, comparison=comparison,
-        trace_s=traces[0], trace_unshaped=traces[1], trace_shaped=traces[2],
-    )  # fmt: skip
+        chosen=None if chosen is None else chosen.kind,
+        comparison=comparison,
+        trace_s=traces[0],
+        trace_unshaped=traces[1],
+        trace_shaped=traces[2],
+    )
     findings, values = _findings(result, moves, settings, lost)
     return result.model_copy(
         update={

@@ -254,9 +254,12 @@ def _held(
         middle = 0.5 * (angle[1:] + angle[:-1])
         torque = data.torque_nm[at][1:] / rated_nm * 100.0
         segment = Segment(
-            rate, np.asarray((middle - middle[0]) / _TURN),
-            about_trend(np.diff(angle) * rate * _RPM, valid), about_trend(torque, valid), valid,
-        )  # fmt: skip
+            rate,
+            np.asarray((middle - middle[0]) / _TURN),
+            about_trend(np.diff(angle) * rate * _RPM, valid),
+            about_trend(torque, valid),
+            valid,
+        )
         low = max(band[0], threshold.PERIODS / segment.duration_s)
         found = tuple(sinusoids(segment, low, band[1]))
         held.append(_Held(abs(number) // 100, sign, segment, found))
@@ -405,9 +408,12 @@ def _resonance(found: Levels, peak: LevelPeak, orders: Sequence[int]) -> Vibrati
 
 
 def _findings(
-    data: Plateaus, found: Levels, orders: Sequence[VibrationOrder],
-    steady: Sequence[VibrationFrequency], resonances: Sequence[VibrationResonance],
-) -> list[VibrationFinding]:  # fmt: skip
+    data: Plateaus,
+    found: Levels,
+    orders: Sequence[VibrationOrder],
+    steady: Sequence[VibrationFrequency],
+    resonances: Sequence[VibrationResonance],
+) -> list[VibrationFinding]:
     finding = VibrationFinding
     if resonances:
         first = [finding(code="resonance", value=r.frequency_hz, unit="Hz") for r in resonances]

@@ -175,9 +175,12 @@ def recorded_beside_loop(loop_hz, *, demand):
     for r in recorded(loop_hz):
         t = np.arange(FINER * r.excitation.samples.size) / (FINER * RATE)
         run = simulate(
-            ONE, drive, FINER * RATE, torque=np.repeat(r.excitation.samples, FINER),
+            ONE,
+            drive,
+            FINER * RATE,
+            torque=np.repeat(r.excitation.samples, FINER),
             velocity=20.0 * np.sin(TURN * t / 0.75),
-        )  # fmt: skip
+        )
         torque = run.torque
         if demand:
             torque = np.diff(torque, prepend=0.0) / (1.0 - kept) + np.concatenate(

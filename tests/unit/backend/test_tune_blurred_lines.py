@@ -30,9 +30,12 @@ GOALS = Goals(10.0, 52.0, 1.7)
 
 
 def fixed(
-    _axis: Axis, _facts: AxisFacts, _notches: tuple[Notch, ...], _filters: LoopFilters,
+    _axis: Axis,
+    _facts: AxisFacts,
+    _notches: tuple[Notch, ...],
+    _filters: LoopFilters,
     f: FloatArray,
-) -> ComplexArray:  # fmt: skip
+) -> ComplexArray:
     return np.asarray(np.exp(-2j * np.pi * f * 100e-6) / (1.0 + 1j * f / 1500.0))
 
 

@@ -156,8 +156,11 @@ def test_padding_of_any_length_keeps_what_follows_in_its_place() -> None:
     assert found.profile.pdo is not None
     rx, tx = found.profile.pdo.sets
     assert [(p.key, p.bits) for p in rx.layout] == [
-        ("6040:00", 16), (None, 24), ("607A:00", 32), (None, 16),
-    ]  # fmt: skip
+        ("6040:00", 16),
+        (None, 24),
+        ("607A:00", 32),
+        (None, 16),
+    ]
     assert sum(p.bits for p in tx.layout) == 16 + 520 + 32
     assert (tx.layout[0].key, tx.layout[-1].key) == ("6041:00", "6064:00")
     assert codes(found) == []
@@ -186,8 +189,10 @@ def test_flags_of_pdos_in_every_spelling() -> None:
     assert found.profile.pdo is not None
     flags = [(p.index, p.mandatory, p.fixed, p.sync_manager) for p in found.profile.pdo.sets]
     assert flags == [
-        (0x1600, True, True, 2), (0x1601, False, False, None), (0x1A00, False, False, 3),
-    ]  # fmt: skip
+        (0x1600, True, True, 2),
+        (0x1601, False, False, None),
+        (0x1A00, False, False, 3),
+    ]
     assert sets(found)[0x1600] == ("6040:00",)
     assert sets(found)[0x1601] == ("607A:00",)
 
@@ -226,8 +231,11 @@ def test_members_that_begin_between_bytes_and_types_of_types() -> None:
     assert "2100:04" not in keys(found)
     held = {n: parameter(found, f"2100:0{n}") for n in (1, 2, 3, 5)}
     assert [(p.type, p.default_raw) for p in held.values()] == [
-        ("BOOL", 1), ("UINT8", 5), ("UINT16", 0xFFF), ("INT16", -2),
-    ]  # fmt: skip
+        ("BOOL", 1),
+        ("UINT8", 5),
+        ("UINT16", 0xFFF),
+        ("INT16", -2),
+    ]
 
 
 @pytest.mark.parametrize("bits", [32, 48])
@@ -265,8 +273,10 @@ def test_an_array_whose_count_has_16_bits_and_names_of_its_own() -> None:
     )
     elements = [parameter(found, f"2400:0{n}") for n in (1, 2, 3)]
     assert [(p.name, p.type, p.default_raw) for p in elements] == [
-        ("Table: X", "INT16", 1), ("Table: Y", "INT16", -1), ("Table: Z", "INT16", 1000),
-    ]  # fmt: skip
+        ("Table: X", "INT16", 1),
+        ("Table: Y", "INT16", -1),
+        ("Table: Z", "INT16", 1000),
+    ]
 
 
 def test_an_enumeration_in_three_languages_and_notations() -> None:
@@ -293,14 +303,15 @@ def test_an_enumeration_in_three_languages_and_notations() -> None:
 
 def test_remarks_within_values_and_names_in_character_data() -> None:
     text = (
-        esi(device(BASE)).decode()
+        esi(device(BASE))
+        .decode()
         .replace("<Index>#x6040</Index>", "<Index>#x<!-- was 6000 -->6040</Index>")
         .replace(
             "<Name>ES4</Name>",
             '<Name LcId="1031"><![CDATA[Antrieb <4>]]></Name><Name LcId="2052">驱动器</Name>'
             '<Name LcId="1033"><![CDATA[Drive <4> & co]]></Name>',
         )
-    )  # fmt: skip
+    )
     found = usable(text.encode())
     assert found.profile.identity.model == "Drive <4> & co"
     assert parameter(found, "6040:00").name == "Controlword"
@@ -392,8 +403,11 @@ def test_values_of_one_machine_in_a_dcf_are_no_defaults() -> None:
     assert codes(found) == ["description.configured-values"]
     values = read_dcf_values(text.encode(), "x.dcf", ImportReport())
     assert [(v.index, v.subindex, v.text) for v in values] == [
-        (0x6083, 0, "250"), (0x2001, 0, "0x15"), (0x2100, 2, "-5"), (0x2100, 4, "0xFFFE"),
-    ]  # fmt: skip
+        (0x6083, 0, "250"),
+        (0x2001, 0, "0x15"),
+        (0x2100, 2, "-5"),
+        (0x2100, 4, "0xFFFE"),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -83,8 +83,11 @@ def scripted(tmp_path: Path, script: str, *arguments: str, here: tuple[str, ...]
     absolute = absolute.replace("$DPKG_ROOT/", f"{system}/")
     done = subprocess.run(
         ["/bin/sh", "-c", absolute, "script", *arguments],
-        env={"PATH": str(programs)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        env={"PATH": str(programs)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return calls.read_text().splitlines()
 

@@ -34,8 +34,9 @@ def _dictionary() -> canopen.ObjectDictionary:
     }
     for n in range(4):
         for communication, mapping, cob_id, target in (
-            (0x1400, 0x1600, 0x205, 0x60400010), (0x1800, 0x1A00, 0x185, 0x60410010),
-        ):  # fmt: skip
+            (0x1400, 0x1600, 0x205, 0x60400010),
+            (0x1800, 0x1A00, 0x185, 0x60410010),
+        ):
             entries = ((U8, 5), (U32, cob_id + 0x100 * n), (U8, 1), (U16, 0), (U8, 0), (U16, 0))
             records[communication + n] = entries
             records[mapping + n] = ((U8, 1), (U32, target), (U32, 0), (U32, 0), (U32, 0))

@@ -242,8 +242,9 @@ def _of_modules(device_pdos: str, module_pdos: str, slots: str, dc: str = DC) ->
     described = re.search("<Profile>.*</Profile>", text)
     assert described is not None
     own = text.replace(described[0], "").replace("</Device>", f"{slots}</Device>")
-    module = re.sub("<Index>(?=#x[61])(?!#x1000)", '<Index DependOnSlot="1">',
-                    f"{module_pdos}{described[0]}")  # fmt: skip
+    module = re.sub(
+        "<Index>(?=#x[61])(?!#x1000)", '<Index DependOnSlot="1">', f"{module_pdos}{described[0]}"
+    )
     return own.replace(
         "</Devices>",
         '</Devices><Modules><Module><Type ModuleIdent="#x10">AX</Type><Name>Axis</Name>'

@@ -387,9 +387,12 @@ class StrictSlave(Slave):
             return code
         if target == AlState.SAFEOP and self.al.state == AlState.PREOP:
             code = (
-                self._commands(("IP", "PS"), AlState.PREOP, 0x8001) or self._assignment()
-                or self._managers() or self._watchdog() or self._clock()
-            )  # fmt: skip
+                self._commands(("IP", "PS"), AlState.PREOP, 0x8001)
+                or self._assignment()
+                or self._managers()
+                or self._watchdog()
+                or self._clock()
+            )
         elif target == AlState.OP:
             code = self._commands(("SO",), AlState.SAFEOP, 0x8002)
         return code

@@ -175,8 +175,9 @@ async def test_an_adapter_that_is_missing_at_a_start_loses_no_drive(tmp_path: Pa
     await bench.close()
     loaded, _ = drives.load()
     assert sorted(loaded, key=lambda each: each.name) == [
-        saved[0], SavedDrive("Y", "mms7", saved[1].ports, "far right", 78, "y"),
-    ]  # fmt: skip
+        saved[0],
+        SavedDrive("Y", "mms7", saved[1].ports, "far right", 78, "y"),
+    ]
     # The next start has all of them; a drive that takes the place of a missing one replaces it.
     bench = _bench(tmp_path, "mlink://virtual0")
     await bench.restore()
@@ -273,8 +274,10 @@ async def test_an_axis_keeps_its_own_scales_when_another_is_missing(tmp_path: Pa
     bench = _bench(tmp_path)
     await bench.restore()
     assert {m.drive.name: m.drive.id for m in bench.connected_drives.values()} == {
-        "轴一": "drive", "轴二": "drive-2", "轴三": "drive-3",
-    }  # fmt: skip
+        "轴一": "drive",
+        "轴二": "drive-2",
+        "轴三": "drive-3",
+    }
     await bench.close()
 
 

@@ -18,8 +18,10 @@ from tests.support.memory_link import MemoryLink
 _UNKNOWN = 0x0BAD
 
 
-@pytest.mark.parametrize(("device_profile", "drives"), [(402, True), (0, True), (None, True),
-                                                        (5001, False), (401, False)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("device_profile", "drives"),
+    [(402, True), (0, True), (None, True), (5001, False), (401, False)],
+)
 def test_a_terminal_on_the_bus_matches_no_profile(device_profile: int | None, drives: bool) -> None:
     """1000h of CiA 301: 402 for drives, 401 and 5001 for inputs and outputs."""
     found = Found(1, vendor_id=_UNKNOWN, product_code=1, device_profile=device_profile)

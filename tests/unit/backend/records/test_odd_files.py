@@ -40,8 +40,11 @@ parameters = 1
 """
 MEASURED = {"version": 1, "kind": "sweep", "saved": "2020-01-01T00:00:00+00:00", "drive": "x"}
 KINDS = {
-    "recordings": ".sdrec", "measurements": ".sdmeas", "sets": ".sdset", "reports": ".html",
-}  # fmt: skip
+    "recordings": ".sdrec",
+    "measurements": ".sdmeas",
+    "sets": ".sdset",
+    "reports": ".html",
+}
 
 
 def _recording(**changed: object) -> bytes:
@@ -92,7 +95,7 @@ CONTENTS = {
         "date": _set(version="2020-01-01"),
     },
     "reports": {},
-}  # fmt: skip
+}
 
 
 @pytest.fixture

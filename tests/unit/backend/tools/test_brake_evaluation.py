@@ -168,8 +168,11 @@ def test_nothing_is_said_of_a_brake_whose_samples_were_lost(lost: Phase, keeps: 
     assert [way.verdict for way in found.ways] == ["held"]
     names = [note.name for note in report(found).notes]
     assert names == [
-        "verdict.cannot_be_tested", "obstacle.samples_lost", "by.output", "measured_at",
-    ]  # fmt: skip
+        "verdict.cannot_be_tested",
+        "obstacle.samples_lost",
+        "by.output",
+        "measured_at",
+    ]
     assert set(names) <= TEXTS.keys()
 
 

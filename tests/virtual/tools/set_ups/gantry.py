@@ -114,11 +114,14 @@ async def gantry(
         both = motors or (motor(brake), motor(brake))
         axes: list[dict[str, Any]] = [
             {
-                "name": name, "drive": "mms7", "on": URL, "station": n,
+                "name": name,
+                "drive": "mms7",
+                "on": URL,
+                "station": n,
                 "mechanics": each.model_dump(exclude_defaults=True),
             }
             for n, (name, each) in enumerate(zip(spec.axes, both, strict=True), 1)
-        ]  # fmt: skip
+        ]
         axes[0]["defects"] = list(defects)
         bench = {"axis": axes, "gantry": [spec.model_dump(mode="json")] if joined else []}
         file.write_text(json.dumps(bench), "utf-8")
