@@ -147,6 +147,9 @@ class RecordedParameter(Message):
     value: int | float | str | None
     time: float | None
     error: str
+    error_message: MessageInfo | None = Field(
+        default=None, description="error as code and facts; files of earlier versions have none"
+    )
 
 
 class RecordingDetail(Message):

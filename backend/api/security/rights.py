@@ -208,6 +208,7 @@ _API: dict[str, Need] = {
     "GET /sets": _LOOK,
     "GET /sets/{file}": _LOOK,
     "GET /sets/{file}/list": _LOOK,
+    "GET /sets/{file}/list/left-out": _LOOK,
     "POST /sets/list": _FILES_UPLOAD,
     "PUT /sets/{file}": _FILES_UPLOAD,
     "DELETE /sets/{file}": _FILES,

@@ -155,7 +155,7 @@ async def test_stop_writes_the_only_word_that_the_manual_prints(ds_c: CanBench) 
 
 async def test_mechanics_of_ds_c_by_its_profile_velocity(ds_c: CanBench) -> None:
     """Aims of a loop at 1 kHz: 0.4 dB and 3° to 200 Hz, resonances within 1 %."""
-    settings = SweepSettings(WIDE, realisations=1, rated_torque_nm=1.27)
+    settings = SweepSettings(WIDE, realisations=3, rated_torque_nm=1.27)
     async with profile_speed.prepared(ds_c.axis, ds_c.session, WIDE, True):
         found = await sweep(ds_c.axis, ds_c.session, settings, silent())
     assert found.loop == "speed"

@@ -10771,6 +10771,8 @@ export interface components {
         RecordedParameter: {
             /** Error */
             error: string;
+            /** @description error as code and facts; files of earlier versions have none */
+            error_message?: components["schemas"]["MessageInfo"] | null;
             /** Key */
             key: string;
             /** Name */
