@@ -12,7 +12,10 @@ export function Viewer({ recording }: { recording: string | null }) {
   const [state, setState] = useViewer()
   useEffect(() => setState(LOADING), [recording, setState])
   // The button of a recording is in the list above, often out of sight from here.
-  useEffect(() => frame.current?.scrollIntoView({ block: 'nearest' }), [recording])
+  // Newer browsers return a promise, which is no clean-up of an effect.
+  useEffect(() => {
+    frame.current?.scrollIntoView({ block: 'nearest' })
+  }, [recording])
   const words = {
     loading: t('rerun.loading', { percent: Math.round(state.fraction * 100) }),
     started: t('rerun.started'),
