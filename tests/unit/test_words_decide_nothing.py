@@ -74,6 +74,10 @@ ALLOWED: dict[tuple[str, str], str] = {
         "reason = request.reason.strip()",
     ): "a person's own words, which must not be empty",
     (
+        "backend/api/scope/recordings.py",
+        "given = request.reason.strip()",
+    ): "a person's own words, or none",
+    (
         "backend/records/recording/library.py",
         "fitting = [s for s in found if all(word in s.words() for word in words)]",
     ): "a person searches recordings by words of their descriptions",
