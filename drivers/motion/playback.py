@@ -510,10 +510,8 @@ class AxisLoop:
             runs_on = self._moved > max(_SLOWED * self._moved_at_stop, _RESTLESS)
             if runs_on and self.goal is State.OPERATION_ENABLED and self.phase is Phase.IDLE:
                 self._let_go_at = None
-                self.goal, self._after_quick_stop = (
-                    State.QUICK_STOP_ACTIVE,
-                    State.SWITCH_ON_DISABLED,
-                )
+                self.goal = State.QUICK_STOP_ACTIVE
+                self._after_quick_stop = State.SWITCH_ON_DISABLED
         if self._let_go_at is not None and self._cycles >= self._let_go_at:
             self._let_go_at = None
             if self.goal is State.OPERATION_ENABLED and self.phase is Phase.IDLE:

@@ -151,20 +151,20 @@ def identify_with_path(
     else:
         paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
 
-    def beside_loop(other: Task) -> list[Trial]:
+    def with_loop(other: Task) -> list[Trial]:
         if loop is not None:
             return other.trials(paths)
         by_speed = find_paths(other.records, path, loop_closed=True, hold_known=hold_known)
         return other.trials(by_speed)
 
     if closed:
-        task, trials = _with_true_speed(task, task.trials(paths), beside_loop)
+        task, trials = _with_true_speed(task, task.trials(paths), with_loop)
         if demand is not None and trials[0].fit.loop.closed:
             fit = trials[0].fit
             records = tuple(with_acting_torque(r, demand, corner_hz, fit) for r in given)
             fresh = replace(task, records=settled(records))
             task = fresh if task.speed_used else fresh.without_speed()
-            trials = beside_loop(task)
+            trials = with_loop(task)
         dropped = False
     else:
         task, trials, dropped = _by_motion(task, paths, corner_known)

@@ -1,4 +1,4 @@
-"""A reported torque (6077h) that is a copy of the demand, beside a closed loop.
+"""A reported torque (6077h) that is a copy of the demand, with a closed loop.
 
 The demand is known exactly then, and what the current loop makes of it is not: all torque passes
 it, the loop's own part as well. Such a torque is replaced by what an ordinary current loop makes of

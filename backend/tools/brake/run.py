@@ -1,8 +1,8 @@
 """The brake test: torque against the closed brake in CST, both directions.
 
 At the slip limit, the cyclic loop of the exchange itself ends the test, in the cycle after the
-sample that exceeds it: it sets the torque to zero, followed by a quick stop
-where no brake slows the shaft down (`drivers.motion.playback`).
+sample that exceeds it: it sets the torque to zero, and begins a quick stop where no brake slows the
+shaft down (`drivers.motion.playback`).
 """
 
 from __future__ import annotations

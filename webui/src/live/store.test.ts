@@ -129,7 +129,7 @@ describe('the store', () => {
     ])
     expect(gone).toEqual(['a', 'b'])
   })
-  it('tells drives with the same id by serial number, else by place', () => {
+  it('distinguishes drives with the same id by serial number, else by place', () => {
     const gone: string[] = []
     whenGone((id) => gone.push(id))
     const one = (serial: number | null, ...stations: number[]) => {

@@ -139,7 +139,7 @@ export function setLink(link: LinkState, now: number): void {
   publish('link')
 }
 
-/** What tells a drive from another one that has its id. */
+/** What distinguishes a drive from another one that has its id. */
 export interface DriveIdentity {
   profile: string
   serial: number | null

@@ -12,7 +12,7 @@ export function Viewer({ recording }: { recording: string | null }) {
   const [state, setState] = useViewer()
   useEffect(() => setState(LOADING), [recording, setState])
   // The button of a recording is in the list above, often out of sight from here.
-  // Newer browsers return a promise, which is no clean-up of an effect.
+  // In braces: what newer browsers return here, React would call as the clean-up of the effect.
   useEffect(() => {
     frame.current?.scrollIntoView({ block: 'nearest' })
   }, [recording])
