@@ -23,7 +23,7 @@ from pathlib import Path
 
 from benchmarks._aims import Aim, print_verdict
 from tests.support.contained import Recipe
-from tests.support.installed import plain_environment, served
+from tests.support.installed import NoServer, plain_environment, served
 
 ROOT = Path(__file__).resolve().parents[1]
 DIST = ROOT / "dist"
@@ -32,6 +32,10 @@ _CACHES = Path("/proc/sys/vm/drop_caches")
 
 class NotHere(Exception):
     """This way cannot be gone on this computer, and why."""
+
+
+class Missed(Exception):
+    """A step came to no end or failed; the other ways are gone all the same."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,11 @@ class Walk:
     def page(self, typed: str, *command: str | Path, path: Path | None = None) -> None:
         """Start the server and get its page with everything that it names."""
         environment = plain_environment(self.scratch / "home", *([path] if path else []))
-        with served(command, self.scratch, environment) as answer:
-            self.steps.append(Step(typed, answer.seconds, answer.processor_s))
+        try:
+            with served(command, self.scratch, environment) as answer:
+                self.steps.append(Step(typed, answer.seconds, answer.processor_s))
+        except (NoServer, OSError) as error:
+            raise Missed(f"{typed}: {error}") from error
 
     @property
     def seconds(self) -> float:
@@ -272,6 +279,10 @@ def main() -> None:
             except NotHere as why:
                 print(f"{name}: not possible here: {why}", flush=True)
                 continue
+            except Missed as why:
+                print(f"{name}: failed: {why}", flush=True)
+                aims.append(Aim(f"{name}: no page", met=False))
+                continue
         print(f"{name}: {len(walk.steps)} steps, {walk.seconds:.1f} s from file to page")
         for number, step in enumerate(walk.steps, start=1):
             worked = f"{step.processor_s:.1f} s of a processor"
@@ -283,7 +294,7 @@ def main() -> None:
             cold = walk.steps[-1].seconds
             aims.append(Aim(f"unpacked folder to page: {cold:.1f} s, aim 10 s", cold <= 10.0))
             aims.append(Aim(f"its cold start: {cold:.1f} s, aim 5 s", cold <= 5.0))
-    print_verdict(aims)
+    sys.exit(0 if print_verdict(aims) else 1)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ from typing import Any
 
 import httpx
 import pytest
-from argon2 import PasswordHasher
+from argon2 import PasswordHasher, extract_parameters
+from argon2.exceptions import VerifyMismatchError
 
 from backend.api.security import body as security_body
 from backend.api.security import protocol as security_protocol
@@ -21,7 +22,7 @@ from backend.foundation.people.login.throttle import LONGEST_WAIT_S, Throttle
 from backend.foundation.people.rights import Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import NAMES, PASSWORD, Caller, GuardedServer
-from tests.support.station import until
+from tests.support.station import NO_CERTIFICATES, until
 
 # --- bodies ---------------------------------------------------------------------------
 
@@ -131,7 +132,10 @@ def test_who_does_not_read_the_answers_is_cut_off(
 
 def try_in(server: GuardedServer, name: str, password: str = "wrong password") -> httpx.Response:
     return httpx.post(
-        f"{server.url}/api/v1/session", json={"name": name, "password": password}, timeout=30
+        f"{server.url}/api/v1/session",
+        json={"name": name, "password": password},
+        timeout=30,
+        verify=NO_CERTIFICATES,
     )
 
 
@@ -167,6 +171,9 @@ def test_a_password_costs_what_rfc_9106_asks() -> None:
     """Second recommendation of clause 4: 64 MiB and three passes."""
     kept = Passwords(DEFAULT)
     assert kept.decoy.startswith("$argon2id$v=19$m=65536,t=3,")
+    assert extract_parameters(kept.decoy) == extract_parameters(kept.hash(PASSWORD))
+    with pytest.raises(VerifyMismatchError):  # it is decoded and hashed, so that it takes as long
+        DEFAULT.verify(kept.decoy, PASSWORD)
     assert kept.verify(kept.hash(PASSWORD), PASSWORD)
     assert not kept.verify(kept.hash(PASSWORD), PASSWORD + " ")
     assert not Passwords(PasswordHasher(1, 8, 1)).verify("no hash", PASSWORD)

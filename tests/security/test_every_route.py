@@ -16,7 +16,7 @@ from backend.foundation.people.rights import RIGHTS, Right, Role
 from tests.security.conftest import Cast
 from tests.support.guarded import PASSWORD, Caller, GuardedServer, Page
 from tests.support.servo import URL
-from tests.support.station import until
+from tests.support.station import NO_CERTIFICATES, until
 
 #: For each placeholder something that is not there, so that what is allowed changes nothing.
 NOWHERE = {"account_id": "999999", "number": "1"}
@@ -364,6 +364,7 @@ def test_log_out_is_at_once_and_for_good(server: GuardedServer) -> None:
             f"{server.url}/api/v1{path}",
             headers={"Cookie": f"servodeck={cookie}"},
             timeout=30,
+            verify=NO_CERTIFICATES,
         )
         assert again.status_code == 401
 

@@ -27,7 +27,7 @@ from backend.foundation.people.login.turns import MOST_OF_PLACE as MOST_WAITING
 from backend.foundation.people.login.turns import MOST_PLACES, HashTurns
 from backend.foundation.people.rights import Role
 from tests.support.guarded import NAMES, PASSWORD, Caller, GuardedServer
-from tests.support.station import until
+from tests.support.station import NO_CERTIFICATES, until
 
 # --- names ----------------------------------------------------------------------------
 
@@ -62,7 +62,10 @@ def test_padding_a_locked_name_gives_no_further_guess(server: GuardedServer) -> 
 
 def guess(server: GuardedServer, name: str, password: str = "a wrong password") -> int:
     return httpx.post(
-        f"{server.url}/api/v1/session", json={"name": name, "password": password}, timeout=60
+        f"{server.url}/api/v1/session",
+        json={"name": name, "password": password},
+        timeout=60,
+        verify=NO_CERTIFICATES,
     ).status_code
 
 

@@ -21,6 +21,10 @@ _ASSET = re.compile(r'(?:src|href)="(?:[.]?/)?(assets/[^"]+)"')
 HANG_S = 120.0
 
 
+class NoServer(AssertionError):
+    """The server ended, or was ended after `HANG_S`, before it gave its address."""
+
+
 @dataclass(frozen=True)
 class Served:
     """A running server: its address, and how long it took until the page was there, with the
@@ -79,7 +83,7 @@ def _address(process: subprocess.Popen[str]) -> str:
         found = _ADDRESS.search(line)
         if found:
             return found[1]
-    raise AssertionError(f"no server: exit code {process.wait()}\n{''.join(printed)}")
+    raise NoServer(f"no server: exit code {process.wait()}\n{''.join(printed)}")
 
 
 def _get(url: str) -> str:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import secrets
+from base64 import b64encode
+
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
+from argon2.low_level import ARGON2_VERSION
 
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
@@ -23,7 +27,7 @@ class Passwords:
         self._hasher = hasher
         #: Hash to verify against where the account does not exist, so that
         #: the answer takes as long.
-        self.decoy = hasher.hash("no account has this password")
+        self.decoy = _random_hash(hasher)
 
     def hash(self, password: str) -> str:
         """Hash a password; returns the string to store."""
@@ -35,6 +39,16 @@ class Passwords:
             return self._hasher.verify(kept, password)
         except (VerificationError, InvalidHashError):
             return False
+
+
+def _random_hash(hasher: PasswordHasher) -> str:
+    """Encoded as a hash of ``hasher``, but of no known password, and made without hashing."""
+    salt, digest = (
+        b64encode(secrets.token_bytes(length)).rstrip(b"=").decode()
+        for length in (hasher.salt_len, hasher.hash_len)
+    )
+    cost = f"m={hasher.memory_cost},t={hasher.time_cost},p={hasher.parallelism}"
+    return f"$argon2{hasher.type.name.lower()}$v={ARGON2_VERSION}${cost}${salt}${digest}"
 
 
 def require_good(password: str, name: str) -> None:
