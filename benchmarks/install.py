@@ -21,6 +21,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import psutil
+
 from benchmarks._aims import Aim, print_verdict
 from tests.support.contained import Recipe
 from tests.support.installed import NoServer, plain_environment, served
@@ -34,8 +36,8 @@ class NotHere(Exception):
     """This way cannot be gone on this computer, and why."""
 
 
-class Missed(Exception):
-    """A step came to no end or failed; the other ways are gone all the same."""
+class WayFailed(Exception):
+    """A step of this way failed, which counts as an aim that was not met."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,11 @@ class Walk:
     steps: list[Step] = field(default_factory=list)
 
     def do(self, typed: str, command: Sequence[str | Path], **environment: str) -> None:
-        """One step that installs, without a network where that can be had."""
+        """One step that installs, without a network where that can be had.
+
+        Raises:
+            WayFailed: the command ended with another exit code than 0.
+        """
         away = ["unshare", "--net"] if self.offline else []
         began, worked = time.monotonic(), _processor_s()
         done = subprocess.run(
@@ -68,17 +74,23 @@ class Walk:
             check=False,
         )
         if done.returncode:
-            raise NotHere(f"{typed}: {done.stderr.strip().splitlines()[-1]}")
+            printed = (done.stderr or done.stdout).strip().splitlines()
+            reason = printed[-1] if printed else "no message"
+            raise WayFailed(f"{typed}: exit code {done.returncode}: {reason}")
         self.steps.append(Step(typed, time.monotonic() - began, _processor_s() - worked))
 
     def page(self, typed: str, *command: str | Path, path: Path | None = None) -> None:
-        """Start the server and get its page with everything that it names."""
+        """Start the server and get its page with everything that it names.
+
+        Raises:
+            WayFailed: the server did not start, or did not serve its page.
+        """
         environment = plain_environment(self.scratch / "home", *([path] if path else []))
         try:
             with served(command, self.scratch, environment) as answer:
                 self.steps.append(Step(typed, answer.seconds, answer.processor_s))
-        except (NoServer, OSError) as error:
-            raise Missed(f"{typed}: {error}") from error
+        except (NoServer, OSError, psutil.Error) as error:
+            raise WayFailed(f"{typed}: {error}") from error
 
     @property
     def seconds(self) -> float:
@@ -279,7 +291,7 @@ def main() -> None:
             except NotHere as why:
                 print(f"{name}: not possible here: {why}", flush=True)
                 continue
-            except Missed as why:
+            except WayFailed as why:
                 print(f"{name}: failed: {why}", flush=True)
                 aims.append(Aim(f"{name}: no page", met=False))
                 continue
