@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import sys
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from backend.foundation.preflight.findings import Finding, findings
 from backend.foundation.preflight.verdicts import PERIODS_US, Verdict, verdicts
+from backend.foundation.work.child import run_child
 from drivers.adapters import require_interface
 from drivers.computer.host_facts import Computer, HostFacts
 from drivers.computer.lateness import Measured, from_json
@@ -84,26 +85,17 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
             held = hold_name(f"servodeck-ethercat-{interface}")
         except OSError as error:
             raise Busy("preflight.ethercat-master-servodeck-uses", interface=interface) from error
-    process = None
-    try:
-        process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
+    with held or contextlib.nullcontext():
+        answer = await run_child(
             "drivers.computer.lateness",
             str(period_us),
             f"{seconds:g}",
             *([interface] if interface else []),
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
         )
-        answer, complaint = await process.communicate()
-    finally:
-        if process is not None and process.returncode is None:
-            process.kill()
-            await process.wait()
-        if held is not None:
-            held.close()
-    if process.returncode:
-        reason = complaint.decode("utf-8", "replace").strip().rpartition("\n")[2]
-        raise LinkLost("preflight.measurement-failed", interface=interface or "none", reason=reason)
-    return from_json(answer.decode("ascii"))
+    if answer.exit_code:
+        raise LinkLost(
+            "preflight.measurement-failed",
+            interface=interface or "none",
+            reason=answer.last_line,
+        )
+    return from_json(answer.out.decode("ascii"))

@@ -13,8 +13,9 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
+from backend.foundation.work.child import run_child
 from drivers.computer.processes import limit_memory, yield_processor
 from drivers.errors import NotAllowed
 from drivers.texts import limits
@@ -51,9 +52,9 @@ async def read_apart(
         return await asyncio.to_thread(work, *arguments, **named)
     loop = asyncio.get_running_loop()
     async with _at_once.setdefault(loop, asyncio.Semaphore(AT_ONCE)):
-        task = (work, arguments, named)
+        task = await asyncio.to_thread(pickle.dumps, (work, arguments, named))
         try:
-            answer = await answer_of("backend.foundation.work.apart", task=task, limit_s=LIMIT_S)
+            answer = await run_child("backend.foundation.work.apart", sent=task, limit_s=LIMIT_S)
         except TimeoutError:
             raise ReadingEnded("work.reading-time", limit_s=LIMIT_S) from None
     result: T
@@ -64,48 +65,6 @@ async def read_apart(
     if error is not None:
         raise error
     return result
-
-
-class Answer(NamedTuple):
-    """Standard output, error output and exit code of a process."""
-
-    out: bytes
-    said: bytes
-    exit_code: int
-
-    @property
-    def last_line(self) -> str:
-        """The last line of the process's error output."""
-        return (self.said.decode("utf-8", "replace").strip().splitlines() or ["it said nothing"])[
-            -1
-        ]
-
-
-async def answer_of(module: str, *arguments: str, task: object, limit_s: float) -> Answer:
-    """Run one of our modules in a process that reads the pickled ``task``; it ends with the caller.
-
-    Raises:
-        TimeoutError: it takes longer than ``limit_s`` [s].
-    """
-    sent = await asyncio.to_thread(pickle.dumps, task)
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        module,
-        *arguments,
-        stdin=asyncio.subprocess.PIPE,
-        stdout=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
-    try:
-        async with asyncio.timeout(limit_s):
-            out, said = await process.communicate(sent)
-        return Answer(out, said, process.returncode or 0)
-    finally:
-        if process.returncode is None:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await asyncio.shield(process.wait())
 
 
 def _loaded(out: bytes) -> tuple[Any, Exception | None]:

@@ -17,6 +17,7 @@ from typing import Any
 
 from backend.foundation.store.files import StorageFailed
 from backend.foundation.store.spreadsheet import as_text
+from backend.foundation.work.child import run_child
 from backend.records.recording import chunks
 from backend.records.recording.bundle_page import LOGS, PAGES, drawings_of, log_line, page, when
 from backend.records.recording.evidence import Evidence, Value
@@ -36,24 +37,10 @@ async def build_apart(evidence: Evidence, target: Path) -> None:
     if not evidence.blocks:
         await asyncio.to_thread(build, evidence, target)
         return
-    process = await asyncio.create_subprocess_exec(
-        sys.executable,
-        "-m",
-        "backend.records.recording.bundle",
-        str(target),
-        stdin=asyncio.subprocess.PIPE,
-        stderr=asyncio.subprocess.PIPE,
-    )
-    try:
-        _, words = await process.communicate(await asyncio.to_thread(pickle.dumps, evidence))
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-    if process.returncode != 0:
-        lines = words.decode(errors="replace").strip().splitlines()
-        why = lines[-1] if lines else f"exit code {process.returncode}"
-        raise _failed(target, why)
+    sent = await asyncio.to_thread(pickle.dumps, evidence)
+    answer = await run_child("backend.records.recording.bundle", str(target), sent=sent)
+    if answer.exit_code != 0:
+        raise _failed(target, answer.last_line)
 
 
 def build(evidence: Evidence, target: Path) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from backend.foundation.work.apart import answer_of
+from backend.foundation.work.child import run_child
 from backend.records.response_import.contents import read_table
 from backend.records.response_import.errors import BadRecording
 from backend.records.response_import.evaluation import ImportSettings, evaluate_signals, prepared
@@ -56,8 +56,10 @@ async def import_in_process(task: ImportTask, limit_s: float = LIMIT_S) -> dict[
         BadRecording: the file is not usable, or its evaluation takes too long.
     """
     try:
-        given = await answer_of(
-            "backend.records.response_import.process", task=task, limit_s=limit_s
+        given = await run_child(
+            "backend.records.response_import.process",
+            sent=await asyncio.to_thread(pickle.dumps, task),
+            limit_s=limit_s,
         )
     except TimeoutError:
         raise BadRecording(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import json
+import pickle
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from backend.foundation.work.apart import answer_of
+from backend.foundation.work.child import run_child
 from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found, Link, Progress
@@ -66,8 +67,11 @@ async def import_in_process(
 
 async def _imported_apart(task: Work, limit_s: float, limit_mib: int) -> dict[str, Any]:
     try:
-        given = await answer_of(
-            "backend.station.drives.import_process", str(limit_mib), task=task, limit_s=limit_s
+        given = await run_child(
+            "backend.station.drives.import_process",
+            str(limit_mib),
+            sent=await asyncio.to_thread(pickle.dumps, task),
+            limit_s=limit_s,
         )
     except TimeoutError:
         raise BadDescription("station.import-ended-after", limit_s=limit_s) from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import sys
 import time
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -12,6 +11,7 @@ from pathlib import Path
 from backend.axes.drive.readings import Reading
 from backend.foundation.store.files import StorageFailed
 from backend.foundation.store.free_space import free_bytes
+from backend.foundation.work.child import run_child
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.foundation.work.journal import Entry
 from backend.records.recording.library import RecordingLibrary
@@ -236,27 +236,15 @@ async def run_export(source: Path, target: Path, kind: str, progress: Progress) 
     Raises:
         StorageFailed: it failed; the message contains the last line of its output.
     """
-    process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "backend.records.recording.export", str(source), str(target), kind,
-        stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
-    )  # fmt: skip
-    assert process.stdout is not None
-    assert process.stderr is not None
-    words = asyncio.create_task(process.stderr.read())
     began = time.monotonic()
-    try:
-        async for line in process.stdout:
-            fraction = float(line)
-            left = (time.monotonic() - began) * (1 - fraction) / max(fraction, 0.01)
-            progress(
-                fraction, text("recording.writing-about-left", target=target.name, left_s=left)
-            )
-        status = await process.wait()
-    finally:
-        if process.returncode is None:
-            process.kill()
-            await process.wait()
-        said = (await words).decode(errors="replace").strip()
-    if status != 0:
-        last = said.splitlines()[-1] if said else f"exit code {status}"
-        raise StorageFailed("recording.not-written", value=target.name, last=last)
+
+    def written(line: bytes) -> None:
+        fraction = float(line)
+        left = (time.monotonic() - began) * (1 - fraction) / max(fraction, 0.01)
+        progress(fraction, text("recording.writing-about-left", target=target.name, left_s=left))
+
+    answer = await run_child(
+        "backend.records.recording.export", str(source), str(target), kind, on_line=written
+    )
+    if answer.exit_code != 0:
+        raise StorageFailed("recording.not-written", value=target.name, last=answer.last_line)

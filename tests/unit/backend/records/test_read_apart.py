@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 
+import psutil
 import pytest
 
 from backend.axes.parameters import set_file
@@ -38,3 +40,29 @@ async def test_a_reading_ends_after_its_time(monkeypatch: pytest.MonkeyPatch) ->
 async def test_a_process_that_ends_without_an_answer_is_reported() -> None:
     with pytest.raises(ReadingEnded):
         await read_apart(SMALL_BYTES + 1, os._exit, 1)
+
+
+@pytest.mark.parametrize("cancellations", [0, 1, 3])
+@pytest.mark.parametrize("after_s", [0.0, 0.002, 0.02, 0.3])
+def test_a_cancelled_reading_leaves_no_process_and_no_pipe(
+    after_s: float, cancellations: int
+) -> None:
+    """At every moment of its start; the end of the event loop is one more cancellation."""
+    before = held()
+
+    async def begun() -> None:
+        reading = asyncio.create_task(read_apart(SMALL_BYTES + 1, time.sleep, 60.0))
+        await asyncio.sleep(after_s)
+        for _ in range(cancellations):
+            reading.cancel()
+            await asyncio.sleep(0)
+
+    began = time.monotonic()
+    asyncio.run(begun())
+    assert time.monotonic() - began < 30
+    assert held() == before
+
+
+def held() -> tuple[int, int]:
+    process = psutil.Process()
+    return process.num_fds(), len(process.children())
