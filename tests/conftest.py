@@ -9,10 +9,16 @@ from pathlib import Path
 import pytest
 
 from drivers.computer.scheduling import VIRTUAL_PRIORITY
+from tests.support import long_suite
 from tests.support.hang import EndsWhatHangs
 
 _ROOT = Path(__file__).resolve().parents[1]
 _homes = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Which of the two suites runs (see `long_suite`)."""
+    long_suite.add_option(parser)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -21,6 +27,8 @@ def pytest_configure(config: pytest.Config) -> None:
     The cache is shared by all tests: it holds only what is made from the project's own files.
     """
     config.pluginmanager.register(EndsWhatHangs(), "ends-what-hangs")
+    config.addinivalue_line("markers", long_suite.MARKER)
+    config.pluginmanager.register(long_suite.LongSuite(config.getoption("--long")), "long-suite")
     home = tempfile.TemporaryDirectory(prefix="servodeck-tests-")
     config.stash[_homes] = home
     os.environ["XDG_DATA_HOME"] = str(Path(home.name) / "data")

@@ -6,7 +6,7 @@
 REPORT is a file or folder of JUnit XML files as ``pytest --junitxml`` writes them; ``make test``
 leaves them in ``.pytest_cache/reports`` and checks the table with them. A row names the test files
 that show it; it counts as tested on the system that they ran on when in each a test passed and none
-failed for good.
+failed.
 """
 
 from __future__ import annotations
@@ -97,8 +97,8 @@ class Ran:
 
     @property
     def good(self) -> bool:
-        """Something passed, and whatever failed once passed when it was run again."""
-        return bool(self.passed) and not self.failed - self.passed
+        """Something passed, and nothing failed."""
+        return bool(self.passed) and not self.failed
 
 
 def read(reports: Iterable[Path]) -> dict[str, Ran]:

@@ -1,13 +1,13 @@
 """Runs every check, says how long each took, and fails if any failed.
 
-    python tests/run_all.py [--fast]
+    python tests/run_all.py [--fast | --long]
 
-``--fast`` leaves out the browser and the slow suites (what pre-commit runs).
+``--fast`` leaves out the suites (what pre-commit runs). ``--long`` runs the tests that are marked
+``long`` and nothing else (see `tests/support/long_suite.py`).
 """
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
@@ -34,6 +34,7 @@ PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
 REAL_TIME = [
     # First: what earlier tests leave in memory makes the server of this one slower.
     "tests/api/test_stop_floods.py",
+    "tests/api/test_stop_first.py",
     "tests/api/test_ethercat.py",
     "tests/api/test_ethercat_faults.py",
     "tests/api/test_ethercat_segment.py",
@@ -66,6 +67,8 @@ LIMIT_S = 2400.0
 #: Of every suite what ran, as JUnit XML.
 REPORTS = ".pytest_cache/reports"
 TWO = ["-n", "2", "--dist", "loadfile"]
+#: Two worker processes take half the time of one.
+TYPES = [str(BIN / "mypy"), "--num-workers", "2"]
 
 
 class Check(NamedTuple):
@@ -76,14 +79,9 @@ class Check(NamedTuple):
     folder: Path = ROOT
 
 
-def pytest(name: str, *arguments: str, again: bool = False) -> Check:
-    """A suite; each keeps its own note of what failed, as two may run at a time.
-
-    Its report says what ran (see `tests/matrix.py`), that of a run ``again`` next to the first.
-    """
-    report = f"{REPORTS}/{name}{' again' if again else ''}.xml"
-    noted = ["-o", f"cache_dir=.pytest_cache/{name}", f"--junitxml={report}"]
-    return Check(name, [*PYTEST, *noted, *arguments])
+def pytest(name: str, *arguments: str) -> Check:
+    """A suite; its report says what ran (see `tests/matrix.py`)."""
+    return Check(name, [*PYTEST, f"--junitxml={REPORTS}/{name}.xml", *arguments])
 
 
 def ignoring(paths: Sequence[str]) -> list[str]:
@@ -96,14 +94,14 @@ def types_on(system: str) -> Check:
     cache = f".mypy_cache/{system}"
     return Check(
         f"types on {system}",
-        [str(BIN / "mypy"), "--platform", system, "--no-warn-unreachable", "--cache-dir", cache],
+        [*TYPES, "--platform", system, "--no-warn-unreachable", "--cache-dir", cache],
     )
 
 
 QUICK = [
     Check("format", [str(BIN / "ruff"), "format", "--check", "."]),
     Check("lint", [str(BIN / "ruff"), "check", "."]),
-    Check("types", [str(BIN / "mypy")]),
+    Check("types", TYPES),
     *(types_on(system) for system in ("win32", "darwin")),
 ]
 #: Checks without a bus as well, next to those of the types: about as long as they.
@@ -122,7 +120,7 @@ TIMED = [
     pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),
 ]
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
-PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
+PAGES = [pytest("browser tests", *TWO, "-m", "browser", "tests/browser")]
 PARALLEL = [
     # Workers write to a pipe: tests of full disks bound the length of files.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT, *ignoring(REAL_TIME)),
@@ -136,8 +134,6 @@ class Runner:
 
     def __init__(self, out: IO[str]) -> None:
         self.failed: list[str] = []
-        self.again: list[Check] = []
-        """What failed in suites, to be run once more when nothing else runs."""
         self._out = out
         self._environment = os.environ | {
             "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}",
@@ -146,22 +142,14 @@ class Runner:
         # Hundreds of servers, commands and virtual drives are started: 2 s of compiling each.
         self._environment.pop("PYTHONDONTWRITEBYTECODE", None)
 
-    def run(self, checks: Sequence[Check], *, last: bool = False) -> None:
-        """Run them in turn; what they print goes where this prints.
-
-        Files with failed tests go to `again`, whole, as the tests of some follow one another; not
-        at the ``last`` time. A busy machine is no defect, and a defect stays one.
-        """
+    def run(self, checks: Sequence[Check]) -> None:
+        """Run them in turn; what they print goes where this prints."""
         for check in checks:
             self._say(f"== {check.name}")
             began = time.monotonic()
             code = self._once(check.command, check.folder)
             self._say(f"== {check.name}: {time.monotonic() - began:.0f} s, exit {code}")
-            suite = list(check.command[: len(PYTEST)]) == PYTEST
-            files = last_failed(check.name) if code == 1 and suite and not last else []
-            if files:
-                self.again.append(pytest(check.name, *files, again=True))
-            elif code != 0:
+            if code != 0:
                 self.failed.append(check.name)
 
     def _say(self, line: str) -> None:
@@ -215,33 +203,41 @@ def _interrupted(number: int, _frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-def last_failed(name: str) -> list[str]:
-    """Files with tests that failed in the last run of a suite; forgotten with this answer.
-
-    None where the suite came to no end.
-    """
-    note = ROOT / ".pytest_cache" / name / "v" / "cache" / "lastfailed"
-    if not note.exists():
-        return []
-    failed = json.loads(note.read_text("utf-8"))
-    note.unlink()
-    return sorted({test.partition("::")[0] for test in failed})
-
-
 def main() -> int:
     """Run the checks; the exit code is the number of those that failed."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupted)
     shutil.rmtree(ROOT / ".pytest_cache", ignore_errors=True)
+    began = time.monotonic()
     runner = Runner(sys.stdout)
-    run_quick(runner)
-    checks, failed = [*QUICK, *QUICK_BESIDE], runner.failed
-    if "--fast" not in sys.argv:
-        checks += [*TIMED, *BUSES, *PAGES, *PARALLEL, *MATRIX]
-        failed = run_suites(runner)
+    checks: list[Check] = []
+    if "--long" in sys.argv:
+        checks = suites("only")
+        runner.run(checks)
+    else:
+        checks = [*QUICK, *QUICK_BESIDE]
+        run_quick(runner)
+        if "--fast" not in sys.argv:
+            suite_checks = [*suites("without"), *MATRIX]
+            checks += suite_checks
+            runner.run(suite_checks)
+    failed = runner.failed
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
-    print(f"{len(checks) - len(failed)} passed, {len(failed)} failed")
+    print(
+        f"{len(checks) - len(failed)} passed, {len(failed)} failed, "
+        f"{time.monotonic() - began:.0f} s"
+    )
     return len(failed)
+
+
+def suites(which: str) -> list[Check]:
+    """The suites, one after the other: two at a time take as long on two processors, and disturb
+    one another. ``which`` is for ``--long`` of pytest.
+    """
+    return [
+        check._replace(command=[*check.command, f"--long={which}"])
+        for check in (*PARALLEL, *TIMED, *BUSES, *PAGES)
+    ]
 
 
 def run_quick(runner: Runner) -> None:
@@ -254,22 +250,6 @@ def run_quick(runner: Runner) -> None:
         printed.seek(0)
         shutil.copyfileobj(printed, sys.stdout)
     runner.failed += parallel.failed
-
-
-def run_suites(runner: Runner) -> list[str]:
-    """Run one suite after the other; returns what failed twice.
-
-    Two at a time take as long on two processors, and disturb one another.
-    """
-    runner.run([*TIMED, *BUSES, *PAGES, *PARALLEL])
-    again = runner.again
-    if again:
-        alone = Runner(sys.stdout)
-        print("== once more, alone", flush=True)
-        alone.run(again, last=True)
-        runner.failed += alone.failed
-    runner.run(MATRIX)
-    return runner.failed
 
 
 if __name__ == "__main__":

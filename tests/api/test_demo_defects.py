@@ -151,12 +151,14 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
         yield demo
 
 
+@pytest.mark.long
 def test_every_defect_is_named_at_the_start(demo: Demo) -> None:
     for name, defect in PLANTED:
         words = DEFECT_WORDS[defect].words("en")
         assert f"{name} has a planted defect: {words}" in demo.printed
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("defect", BY_FIRST_POWER)
 def test_first_power_finds_it_and_names_the_next_step(demo: Demo, defect: Defect) -> None:
     result = demo.measured(defect, "first-power", **ASKED)

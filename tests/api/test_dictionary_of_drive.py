@@ -35,6 +35,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
         running.stop()
 
 
+@pytest.mark.long
 def test_what_the_drive_lists_is_a_profile(station: Station) -> None:
     body = {"url": URL, "station": 1, "profile": "as_reported"}
     made = station.done(station.http.post("/descriptions/from-drive", json=body), 60)

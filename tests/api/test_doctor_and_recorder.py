@@ -84,6 +84,7 @@ def command(station: Station, *arguments: str, code: int = 0) -> str:
 # --- the recorder ------------------------------------------------------------------------
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("url", "chosen"), [(SEGMENT, "ecat_mailbox.coe"), (CAN, "can.id == 0x583")]
 )
@@ -117,6 +118,7 @@ def test_the_command_writes_the_file(station: Station, tmp_path: Path) -> None:
     assert decoded(out.read_bytes(), tmp_path, "can")
 
 
+@pytest.mark.long
 def test_the_bundle_of_a_fault_has_the_frames(
     station: Station, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -156,6 +158,7 @@ def test_a_segment_that_is_not_started(station: Station) -> None:
     assert only["causes"][0]["remedy_zh"]
 
 
+@pytest.mark.long
 def test_a_node_that_waits_to_be_started_and_one_that_has_a_fault(station: Station) -> None:
     drive = next(d for d in station.ok(station.http.get("/drives")) if d["name"] == "Z")["id"]
     station.drives.command(do="inject", axis="Z", what="overload")
@@ -186,6 +189,7 @@ def test_a_serial_line_has_no_doctor(station: Station) -> None:
     assert "EtherCAT and CANopen" in answer.json()["detail"]
 
 
+@pytest.mark.long
 def test_the_command_shows_causes_with_facts_and_ends_with_1(station: Station) -> None:
     shown = command(station, "doctor", CAN, "--station", "3", code=1)
     assert "1. " in shown
@@ -204,6 +208,7 @@ def slave(running: Station, command: str, **arguments: Any) -> Any:
     return running.drives.segments[SEGMENT].command(command, slave=0, **arguments)
 
 
+@pytest.mark.long
 def test_a_setting_is_tried_kept_and_undone(station: Station) -> None:
     """The drive refuses Safe-Op at first, and takes the setting later, as after a repair."""
     slave(station, "refuse", state="SAFEOP", code=0x0030)  # ETG.1020: invalid DC SYNC configuration

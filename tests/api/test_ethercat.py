@@ -108,6 +108,7 @@ def undisturbed(motion: Callable[[], Any]) -> Any:
     raise AssertionError(f"this machine stalls too often: {outcome}")
 
 
+@pytest.mark.long
 def test_scan_read_write_save(station: Station, axes: tuple[str, str]) -> None:
     result = station.done(station.http.post("/scan", json={"url": URL}))
     assert [drive["station"] for drive in result["found"]] == [1, 2]
@@ -123,6 +124,7 @@ def test_scan_read_write_save(station: Station, axes: tuple[str, str]) -> None:
     assert (answer["pending"], answer["unsaved"]) == ("", False)
 
 
+@pytest.mark.long
 def test_cyclic_exchange_tells_what_it_carries(station: Station, cyclic: tuple[str, str]) -> None:
     (bus,) = station.ok(station.http.get("/buses"))
     assert bus["cyclic"]["cycle_us"] == 1000
@@ -135,6 +137,7 @@ def test_cyclic_exchange_tells_what_it_carries(station: Station, cyclic: tuple[s
     assert refused["state"] == "failed", "a scan would reset drives that exchange process data"
 
 
+@pytest.mark.long
 def test_jog_plays_one_position_per_cycle(station: Station, cyclic: tuple[str, str]) -> None:
     a, b = cyclic
     with station.live() as page:
@@ -212,6 +215,7 @@ def test_stop_brakes_cyclic_motion(station: Station, cyclic: tuple[str, str]) ->
     assert now["state"] != "Operation enabled"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("mode", "amplitude"), [("CSP", 0.25), ("CSV", 120.0), ("CST", 4.0)])
 def test_signal_generator(
     station: Station, cyclic: tuple[str, str], mode: str, amplitude: float
@@ -228,6 +232,7 @@ def test_signal_generator(
     assert station.state(a)["state"] == "Switch on disabled"
 
 
+@pytest.mark.long
 def test_signal_outside_the_envelope_moves_nothing(
     station: Station, cyclic: tuple[str, str]
 ) -> None:
@@ -241,6 +246,7 @@ def test_signal_outside_the_envelope_moves_nothing(
     assert station.state(a)["position"] == pytest.approx(before, abs=0.001)
 
 
+@pytest.mark.long
 def test_profile_moves_are_refused_while_cyclic(station: Station, cyclic: tuple[str, str]) -> None:
     a, _ = cyclic
     body = {"mode": "PP", "target": 1.0, "relative": True, "travel_limit": 3, "torque_limit": 100}
@@ -277,6 +283,7 @@ def test_command_line_finds_reads_writes_and_saves(station: Station, axes: tuple
     assert "try:" in refused
 
 
+@pytest.mark.long
 def test_command_line_compares_and_loads(
     station: Station, axes: tuple[str, str], tmp_path: Path
 ) -> None:
@@ -308,6 +315,7 @@ def test_command_line_compares_and_loads(
     assert "cannot be read: No such file" in refused
 
 
+@pytest.mark.long
 def test_command_line_tells_terminals_faults_and_gear(
     station: Station, axes: tuple[str, str]
 ) -> None:
@@ -325,6 +333,7 @@ def test_command_line_tells_terminals_faults_and_gear(
     command(station, "params", "set", URL, "6092:01=65536", "--raw", *at_b)
 
 
+@pytest.mark.long
 def test_command_line_jogs_and_records(
     station: Station, axes: tuple[str, str], tmp_path: Path
 ) -> None:

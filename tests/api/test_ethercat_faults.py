@@ -211,6 +211,7 @@ def reason(ended: Any) -> str:
     return f"{ended['reason']} {(ended['problem'] or {}).get('detail', '')}"
 
 
+@pytest.mark.long
 def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):
@@ -251,6 +252,7 @@ def test_power_cycle_of_a_slave(running: Segment) -> None:
     running.jogs()
 
 
+@pytest.mark.long
 def test_mute_mailbox_ends_in_words_while_process_data_go_on(running: Segment) -> None:
     running.trouble("mute", slave=B)
     began = time.monotonic()
@@ -274,6 +276,7 @@ def test_mute_mailbox_ends_in_words_while_process_data_go_on(running: Segment) -
     running.jogs()
 
 
+@pytest.mark.long
 def test_dying_in_a_transfer_ends_in_words_and_is_read_again(running: Segment) -> None:
     keys = [f"1A00:{n:02X}" for n in range(9)]
     before = running.whole(running.b, keys)
@@ -293,6 +296,7 @@ def test_dying_in_a_transfer_ends_in_words_and_is_read_again(running: Segment) -
     running.jogs()
 
 
+@pytest.mark.long
 def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None:
     with running.station.live() as page:
         with turning(page, running):
@@ -310,6 +314,7 @@ def test_single_lost_frames_are_counted_and_many_brake(running: Segment) -> None
     assert all(s["state"] == "OP" for s in running.view()["stations"])
 
 
+@pytest.mark.long
 def test_wrong_working_counters_are_counted_and_brake_when_they_stay(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):
@@ -323,6 +328,7 @@ def test_wrong_working_counters_are_counted_and_brake_when_they_stay(running: Se
     running.jogs()
 
 
+@pytest.mark.long
 def test_late_frames_are_waited_for_and_the_axis_goes_on(running: Segment) -> None:
     """Time follows the frames here: late ones are late for the server, not for the drive."""
     running.trouble("late", by_s=0.02, chance=0.05, cyclic=True)
@@ -330,6 +336,7 @@ def test_late_frames_are_waited_for_and_the_axis_goes_on(running: Segment) -> No
     assert [s["state"] for s in running.view()["stations"]] == ["OP", "OP"]
 
 
+@pytest.mark.long
 def test_slow_answers_and_slow_states_take_their_time_and_no_more(running: Segment) -> None:
     # In the drive's time, which a busy machine stretches: the mailbox's own time-out is 1 s.
     running.trouble("timing", slave=B, sdo_s=0.05, al_s=0.1)
@@ -343,6 +350,7 @@ def test_slow_answers_and_slow_states_take_their_time_and_no_more(running: Segme
     running.jogs()
 
 
+@pytest.mark.long
 def test_a_busy_eeprom_ends_in_words_and_is_written_later(running: Segment) -> None:
     running.end_cyclic()
     body = {"url": URL, "station": 2, "alias": 0, "confirmed": True}
@@ -426,6 +434,7 @@ def test_killed_host_ends_the_motion_and_is_replaced(running: Segment) -> None:
     running.jogs()
 
 
+@pytest.mark.long
 def test_an_exchange_that_is_being_set_up_again_can_be_ended(running: Segment) -> None:
     before = running.lines()
     running.trouble("refuse", slave=B, state="SAFEOP", code=0x001D)
@@ -445,6 +454,7 @@ def test_an_exchange_that_is_being_set_up_again_can_be_ended(running: Segment) -
     running.jogs()
 
 
+@pytest.mark.long
 def test_killed_segment_ends_the_motion_and_is_found_again(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):

@@ -58,6 +58,7 @@ def view(station: Station) -> Any:
     return station.ok(station.http.get("/ethercat/segment", params={"url": URL}))
 
 
+@pytest.mark.long
 def test_stations_in_the_order_of_the_cable(station: Station) -> None:
     seen = view(station)
     assert (seen["connected"], seen["problem"], seen["private_network"]) == (True, "", True)
@@ -76,6 +77,7 @@ def test_stations_in_the_order_of_the_cable(station: Station) -> None:
     assert second["clock_ahead_ns"] is None, "nobody keeps it current without exchange"
 
 
+@pytest.mark.long
 def test_figures_of_the_exchange(in_real_time: Station) -> None:
     station = in_real_time
     body = {"url": URL, "cycle_us": 1000}

@@ -174,6 +174,7 @@ def day(station: Station, request: pytest.FixtureRequest) -> Iterator[Day]:
     station.remove(drive)
 
 
+@pytest.mark.long(keep=["ds_c"])
 def test_a_working_day(day: Day) -> None:
     read_all(day)
     home(day)

@@ -33,6 +33,7 @@ def simulation(station: Station, x: str) -> Iterator[str]:
         station.ok(station.http.delete(path))
 
 
+@pytest.mark.long
 def test_functions_are_described(station: Station, x: str) -> None:
     functions = station.ok(station.http.get(f"/drives/{x}/functions"))
     assert functions["history"]["kind"] == "unreadable"

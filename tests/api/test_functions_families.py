@@ -64,6 +64,7 @@ def terminals(station: Station, family: str) -> dict[str, Any]:
     return {terminal["name"]: terminal for terminal in answer["terminals"]}
 
 
+@pytest.mark.long
 def test_m6l_shows_its_three_faults_with_their_snapshots(station: Station) -> None:
     """P10.18 to P10.59: newest first, thirteen values each (000:3497)."""
     cause(station, "m6l", "Er.004")
@@ -84,6 +85,7 @@ def test_m6l_shows_its_three_faults_with_their_snapshots(station: Station) -> No
     assert station.ok(station.http.get("/drives/m6l/fault-history"))["entries"] == []
 
 
+@pytest.mark.long
 def test_r6l_shows_its_record_and_leaves_the_selector_alone(station: Station) -> None:
     """P13.35 selects one of ten records (002:12361)."""
     put(station, "r6l", "200D:24", 3)
@@ -101,6 +103,7 @@ def test_ep3e_says_that_nothing_is_known(station: Station) -> None:
     assert (info["kind"], info["entries"]) == ("unknown", [])
 
 
+@pytest.mark.long
 def test_r6l_forces_an_output_that_has_the_function_for_it(station: Station) -> None:
     """60FEh acts on outputs with function 31 (002:14003); DO1 is the brake by default."""
     path = "/drives/r6l/io/forcing/outputs"
@@ -119,6 +122,7 @@ def test_r6l_forces_an_output_that_has_the_function_for_it(station: Station) -> 
     put(station, "r6l", "2002:23", before)
 
 
+@pytest.mark.long
 def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> None:
     """60FEh acts in OP (000:3101)."""
     path = "/drives/m6l/io/forcing/outputs"

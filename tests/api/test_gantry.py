@@ -197,6 +197,7 @@ def between(found: Any, truth: float) -> bool:
     return bool(low <= truth <= high)
 
 
+@pytest.mark.long
 def test_a_gantry_out_of_square_is_measured(gantry: Gantry) -> None:
     """Brakes hold the beam where both motors show the same, which is not where it rests."""
     station = gantry.station
@@ -222,6 +223,7 @@ def test_a_gantry_out_of_square_is_measured(gantry: Gantry) -> None:
     assert again["result"]["fight_percent"] == found["fight_percent"]
 
 
+@pytest.mark.long
 def test_stop_of_the_partner_ends_both(gantry: Gantry) -> None:
     job, before = gantry.moving()
     other = gantry.station.http.post(f"/drives/{gantry.right}/jobs/friction", json=LIMITS)
@@ -264,6 +266,7 @@ def test_a_fault_of_the_partner_ends_both(gantry: Gantry) -> None:
     gantry.station.ok(gantry.station.http.post(f"/drives/{gantry.right}/fault-reset", json={}))
 
 
+@pytest.mark.long
 def test_a_power_cycle_of_the_partner_ends_both(gantry: Gantry) -> None:
     job, before = gantry.moving()
     gantry.trouble("power_cycle", slave=1, off_s=1.0)

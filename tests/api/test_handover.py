@@ -94,10 +94,12 @@ def check_commands(tmp_path: Path, *where: str) -> None:
         call("params", "set", bus, f"{GAIN}={before}", "--raw", *options)
 
 
+@pytest.mark.long
 def test_commands_on_a_wire(url: str, tmp_path: Path) -> None:
     check_commands(tmp_path, url, "--profile", "mms7")
 
 
+@pytest.mark.long
 def test_commands_by_a_server(station: Station, x: str, tmp_path: Path) -> None:
     check_commands(tmp_path, "mlink://virtual0", "--station", "1", "--server", station.url)
 
@@ -254,6 +256,7 @@ def test_the_script_writes_over_the_api(
     assert stranger.returncode == 1
 
 
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize(
     ("body", "status", "words"),
     [

@@ -62,6 +62,7 @@ def makers_file() -> bytes:
     ).encode()
 
 
+@pytest.mark.long
 def test_padded_process_data_are_exchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SERVODECK_PROFILES", str(tmp_path / "mine"))
     monkeypatch.setenv("SERVODECK_CACHE", str(tmp_path / "cache"))

@@ -115,6 +115,7 @@ def test_killed_server_leaves_an_axis_that_stops_by_itself(
     assert (max(still, default=seen[0][0]) - seen[0][0]) < 0.6, "and it stands soon"
 
 
+@pytest.mark.long
 def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path: Path) -> None:
     url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
@@ -128,6 +129,7 @@ def test_server_finds_its_drives_again_after_a_kill(drives: DemoBench, tmp_path:
         again.end()
 
 
+@pytest.mark.long
 def test_what_a_killed_server_left_in_the_drive_is_put_back(
     drives: DemoBench, tmp_path: Path
 ) -> None:
@@ -173,6 +175,7 @@ def test_what_a_killed_server_left_in_the_drive_is_put_back(
     assert asyncio.run(number(url, 0x6083, "UINT32")) == before
 
 
+@pytest.mark.long
 def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) -> None:
     url = drives.addresses["mlink://virtual0"]
     server = ServerProcess(tmp_path / "state")
@@ -186,6 +189,7 @@ def test_ended_server_stops_the_axis_first(drives: DemoBench, tmp_path: Path) ->
     assert abs(seen[-1][1] - seen[0][1]) < 65536 * 0.002
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["server ends", "axis leaves the bench"])
 def test_an_axis_left_enabled_loses_its_power(drives: DemoBench, tmp_path: Path, how: str) -> None:
     """Nobody looks after it any more (DS402 status: not Operation enabled, 6041h bit 2)."""

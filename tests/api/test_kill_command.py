@@ -107,6 +107,7 @@ def canopen(tmp_path: Path) -> Iterator[Bench]:
         yield Bench(tmp_path, drives.addresses["canopen://virtual0"], drives, list)
 
 
+@pytest.mark.long
 def test_a_sweep_killed_on_ethercat_is_reported_and_restored_by_a_command(ethercat: Bench) -> None:
     before, quiet = ethercat.held(MODE, QUICK_STOP)
     assert "temporary values" not in quiet

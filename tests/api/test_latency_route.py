@@ -31,6 +31,7 @@ def port(monkeypatch: pytest.MonkeyPatch) -> OnePort:
     return registry
 
 
+@pytest.mark.long
 def test_bounds_then_measured_figures(station: Station, port: OnePort) -> None:
     before = station.ok(station.http.get(PATH, params=COM3))
     assert (before["ms"], before["reads_at_most"], before["lowered_reads_at_most"]) == (

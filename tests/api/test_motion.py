@@ -129,6 +129,7 @@ def test_jog_restores_what_it_changed(station: Station, x: str, page: Live) -> N
     assert read() == before
 
 
+@pytest.mark.long
 def test_pulled_cable_ends_within_the_lead(station: Station, x: str, page: Live) -> None:
     """No watchdog in the drive: its own profile generator must brake (architecture)."""
     with jogged(station, page, x, fast):

@@ -28,6 +28,7 @@ def command(*arguments: str, inside: Namespace | None = None) -> subprocess.Comp
     )
 
 
+@pytest.mark.long
 @pytest.mark.skipif(unavailable() is not None, reason="no network namespaces here")
 def test_frames_on_a_private_cable(tmp_path: Path) -> None:
     """Loopback inside a namespace of its own returns every frame."""
@@ -64,6 +65,7 @@ def test_a_bus_in_use_is_left_alone(tmp_path: Path) -> None:
     assert "an EtherCAT master of servodeck uses lo" in done.stderr
 
 
+@pytest.mark.long
 def test_a_measurement_is_a_job_and_its_result_is_kept(station: Station) -> None:
     before = station.ok(station.http.get("/preflight"))
     assert {one["grade"] for one in before["verdicts"]} <= {"suitable", "not_measured"}

@@ -101,6 +101,7 @@ def first(found: list[str], before: set[str]) -> str:
     return next(code for code in found if code not in before)
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(
     ("interface", "without", "code"),
     [

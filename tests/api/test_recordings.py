@@ -119,6 +119,7 @@ def test_moved_axis_is_recorded_with_what_was_changed(station: Station, x: str) 
     assert any(e["kind"] == "parameter" and "2500" in e["text"] for e in events), events
 
 
+@pytest.mark.long
 def test_trigger_keeps_what_was_before_it(station: Station, x: str) -> None:
     trigger = {"kind": "rising", "drive": x, "key": VELOCITY, "level": RPM_100}
     row = start(station, x, name="step", trigger=trigger, pre_s=0.5, duration_s=0.5)
@@ -234,6 +235,7 @@ def test_retention_deletes_the_oldest_but_not_the_kept(station: Station, x: str)
         station.ok(station.http.put("/recordings/retention", json=before))
 
 
+@pytest.mark.long
 def test_fault_freezes_the_last_seconds(station: Station, x: str) -> None:
     name = start(station, x, trigger={"kind": "fault", "drive": x}, pre_s=2)["name"]
     until(lambda: station.state(x)["fresh"])
@@ -276,6 +278,7 @@ def test_bundle_by_hand(station: Station, x: str) -> None:
     assert station.http.get(f"/bundles/{made['name']}").status_code == 404
 
 
+@pytest.mark.long
 def test_bundle_of_a_mute_drive(station: Station, x: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is not waited for without end; what was known before goes in, with its time."""
     monkeypatch.setattr(capture, "READ_TIMEOUT_S", 0.5)

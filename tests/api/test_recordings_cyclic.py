@@ -48,6 +48,7 @@ def table(text: str) -> tuple[list[str], np.ndarray]:
     return titles, np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
+@pytest.mark.long
 def test_every_cycle_of_both_axes_is_on_the_disk(station: Station, cyclic: tuple[str, str]) -> None:
     body = {"channels": [{"drive": d, "key": k} for d in cyclic for k in (POSITION, VELOCITY)]}
     name = station.ok(station.http.post("/recordings", json=body))["name"]
@@ -76,6 +77,7 @@ def test_every_cycle_of_both_axes_is_on_the_disk(station: Station, cyclic: tuple
     station.ok(station.http.delete(f"/recordings/{name}"))
 
 
+@pytest.mark.long
 def test_a_bundle_has_every_cycle_of_the_last_seconds(
     station: Station, cyclic: tuple[str, str]
 ) -> None:

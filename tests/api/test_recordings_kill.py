@@ -27,6 +27,7 @@ def listed(server: ServerProcess) -> dict[str, Any]:
     return dict(rows[0])
 
 
+@pytest.mark.long
 def test_killed_server_leaves_a_recording_up_to_the_last_second(
     drives: DemoBench, tmp_path: Path
 ) -> None:

@@ -42,6 +42,7 @@ def _upload(station: Station, drive: str, name: str, made: Any, minutes: float =
     return station.http.post("/measurements", params={"name": name}, content=data)
 
 
+@pytest.mark.long
 def test_a_stored_measurement_is_evaluated_anew(station: Station, drive: str) -> None:
     info = station.ok(_upload(station, drive, "step", known.step()))
     content = station.ok(station.http.get(f"/measurements/{info['file']}"))

@@ -50,6 +50,7 @@ def words(path: Path) -> list[str]:
     return found
 
 
+@pytest.mark.long
 def test_feed_is_what_reruns_own_reader_reads(
     station: Station, x: str, feed: ClientConnection, tmp_path: Path
 ) -> None:
@@ -116,6 +117,7 @@ def test_foreign_pages_get_no_feed(station: Station) -> None:
         pass
 
 
+@pytest.mark.long
 def test_viewer_comes_from_here_and_only_it_may_compile(station: Station) -> None:
     page = httpx.get(f"{station.url}/rerun/")
     assert "'wasm-unsafe-eval'" in page.headers["content-security-policy"]

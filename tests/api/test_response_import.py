@@ -28,6 +28,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     running.stop()
 
 
+@pytest.mark.long
 def test_columns_are_shown_before_anything_is_stored(station: Station) -> None:
     found = station.ok(
         station.http.post(
@@ -41,6 +42,7 @@ def test_columns_are_shown_before_anything_is_stored(station: Station) -> None:
     assert station.ok(station.http.get("/measurements")) == []
 
 
+@pytest.mark.long
 def test_an_import_is_stored_and_evaluated_anew(station: Station) -> None:
     info = station.ok(
         station.http.post(
@@ -63,6 +65,7 @@ def test_an_import_is_stored_and_evaluated_anew(station: Station) -> None:
     assert station.http.delete(f"/measurements/{info['file']}").status_code == 204
 
 
+@pytest.mark.long
 def test_a_filtered_speed_gives_no_inertia(station: Station) -> None:
     query = {k: v for k, v in QUERY.items() if k != "output_filter_hz"}
     info = station.ok(
@@ -78,6 +81,7 @@ def test_a_filtered_speed_gives_no_inertia(station: Station) -> None:
     station.http.delete(f"/measurements/{info['file']}")
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     "content",
     [b"", os.urandom(1 << 16), gzip.compress(b"\0" * (300 << 20), 1), b"1,2\n" * 10, b"{}" * 999],
@@ -92,6 +96,7 @@ def test_hostile_files_are_refused_and_the_server_answers(station: Station, cont
     assert station.ok(station.http.get("/measurements")) == []
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("name", ["../../etc/passwd", "C:\\x\\y.csv", "", "测量.csv", "a" * 200])
 def test_a_name_makes_no_path(station: Station, name: str) -> None:
     rows = "\n".join(f"{i / 1000},{(i * i) % 97},{(i * i * i) % 89}" for i in range(2000))

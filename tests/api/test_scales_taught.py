@@ -47,6 +47,7 @@ def scales(station: Station, drive: str) -> Any:
     return station.ok(station.http.get(f"/drives/{drive}/scales"))
 
 
+@pytest.mark.long
 def test_from_refused_to_taught(station: Station) -> None:
     drive = station.add(5, CAN, "generic402", "N")
     before = scales(station, drive)

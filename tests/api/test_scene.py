@@ -71,6 +71,7 @@ def a_good_way_off(now: Any, _start: float) -> bool:
     return float(now["position"]) > 1.3
 
 
+@pytest.mark.long
 def test_parts_follow_the_motor(station: Station, x: str) -> None:
     screw = {"mechanics": {"kind": "screw", "lead_mm": 10, "motor_turns": 2}}
     station.ok(station.http.put(f"/drives/{x}/mechanics", json=screw))
@@ -99,6 +100,7 @@ def test_parts_follow_the_motor(station: Station, x: str) -> None:
     assert seen.of("/carriage")["position"][0] == pytest.approx(0.9 * turns * 5 / 25, abs=0.01)
 
 
+@pytest.mark.long
 def test_the_scene_is_built_anew_with_the_bench(station: Station, scene: Connection) -> None:
     seen = Seen(scene)
     seen.watch(1)
@@ -142,6 +144,7 @@ def test_what_a_page_sends_is_not_passed_on(
     assert "Share URL requested" not in "".join(capfd.readouterr())
 
 
+@pytest.mark.long
 def test_without_a_viewer_the_bus_is_left_alone(station: Station, x: str) -> None:
     def count() -> int:
         buses = station.ok(station.http.get("/buses"))

@@ -86,6 +86,7 @@ def unbroken(frames: list[bytes], number: int) -> int:
     return sum(block[2] for block in blocks)
 
 
+@pytest.mark.long
 def test_sixteen_channels_at_4_khz(station: Station, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (live_connection, live_scope):
         monkeypatch.setattr(module, "SEND_TIMEOUT_S", 600.0)  # the sleeping one is to wake

@@ -38,6 +38,7 @@ def snapshot(rows: int = 5, **change: object) -> bytes:
     return b"SDSNAP1\n" + struct.pack("<I", len(text)) + text + columns
 
 
+@pytest.mark.long
 def test_setups_are_kept_under_their_names(station: Station) -> None:
     http = station.http
     assert station.ok(http.get("/scope/setups")) == []

@@ -96,6 +96,7 @@ def heads(frames: list[bytes], number: int = 1) -> list[tuple[Any, ...]]:
     return [(h[2], h[3], h[4], h[6], h[7], h[8]) for h in found if h[1] == number]
 
 
+@pytest.mark.long
 def test_a_subscription_follows_the_exchange_as_it_starts_and_ends(
     station: Station, axis: str
 ) -> None:
@@ -180,6 +181,7 @@ def ask_for_much(page: ClientConnection, axis: str, numbers: range) -> None:
         page.send(json.dumps({"type": "scope_start", "subscription": number, "channels": channels}))
 
 
+@pytest.mark.long
 def test_a_sleeping_page_loses_only_its_own_view_and_every_sample_is_counted(
     station: Station, axis: str, asleep: ClientConnection, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -220,6 +222,7 @@ def read_on(page: ClientConnection) -> None:
         page.recv(timeout=10)
 
 
+@pytest.mark.long
 def test_a_page_that_never_reads_is_cut_off(
     station: Station,
     axis: str,
@@ -240,6 +243,7 @@ def test_a_page_that_never_reads_is_cut_off(
     assert not [r for r in caplog.records if r.levelname == "ERROR"], "an ordinary end"
 
 
+@pytest.mark.long
 def test_a_half_open_connection_ends_and_with_it_the_polling(
     station: Station, serial: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

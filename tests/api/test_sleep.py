@@ -13,6 +13,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 from backend.foundation.work.sleep_watch import LONGEST_S
 from backend.station.demo import DemoBench
 from tests.api.test_kill import ServerProcess, add_drive, drives
@@ -53,6 +55,7 @@ def test_an_axis_that_moved_meanwhile_is_stopped(drives: DemoBench, tmp_path: Pa
         server.end()
 
 
+@pytest.mark.long
 def test_a_command_that_moves_restores_and_reports_it(canopen: Bench) -> None:
     before, _ = canopen.held(MODE, RAMP)
     sweep = canopen.start(

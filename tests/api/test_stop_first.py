@@ -18,6 +18,7 @@ def ended(station: Station, job: str) -> bool:
     return bool(station.ok(station.http.get(f"/jobs/{job}"))["state"] != "running")
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize("delay_s", [0.0, 0.01, 0.03, 0.06, 0.1, 0.3])
 @pytest.mark.parametrize("way", ["http", "websocket"])
 def test_stop_in_every_phase_of_a_move(station: Station, x: str, way: str, delay_s: float) -> None:

@@ -111,6 +111,7 @@ def flooded(server: GuardedServer, kind: str, caller: Caller) -> Iterator[None]:
     assert done > 0
 
 
+@pytest.mark.long(keep=["idle"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_stop_within_100_ms(server: GuardedServer, kind: str) -> None:
     operator, viewer = server.log_in(Role.OPERATOR), server.log_in(Role.VIEWER)
@@ -142,6 +143,7 @@ def figures(kind: str, took: list[tuple[float, float]]) -> float:
     return p99
 
 
+@pytest.mark.long
 def test_idle_connections_do_not_grow_in_number(server: GuardedServer) -> None:
     viewer = server.log_in(Role.VIEWER)
     lines = []

@@ -33,6 +33,7 @@ def z(station: Station) -> Iterator[str]:
     station.remove(drive)
 
 
+@pytest.mark.long
 def test_scan_finds_it_on_the_can_bus(station: Station) -> None:
     result = station.done(station.http.post("/scan", json={"url": CAN, "stations": [2, 3, 4]}))
     assert [drive["station"] for drive in result["found"]] == [3]
@@ -268,6 +269,7 @@ def reported_of(bundle: Bundle, drive: str) -> None:
     assert link["transactions"] > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("url", "number", "only_here"), [(CAN, 3, False), (MODBUS, 1, True)])
 def test_a_fault_keeps_what_was_read(
     station: Station, bundle_of: Callable[[str], Bundle], url: str, number: int, only_here: bool
@@ -287,6 +289,7 @@ def test_a_fault_keeps_what_was_read(
     assert ("PA_38" in keys) is only_here, "what only the other port reaches is left out"
 
 
+@pytest.mark.long
 def test_a_fault_keeps_every_cycle_of_a_can_bus(
     station: Station, z: str, bundle_of: Callable[[str], Bundle]
 ) -> None:

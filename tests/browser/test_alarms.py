@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.driving import REPORTED_MS, Bench, open_axis
@@ -15,6 +16,7 @@ def inject(bench: Bench, what: str, **more: object) -> None:
     bench.station.drives.command(do="inject", axis="X", what=what, **more)
 
 
+@pytest.mark.long
 def test_a_fault_is_explained_and_reset(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "alarms")
@@ -31,6 +33,7 @@ def test_a_fault_is_explained_and_reset(laptop: Page, bench: Bench) -> None:
     assert bench.state()["state"] == "Switch on disabled"
 
 
+@pytest.mark.long
 def test_a_refused_reset_says_why(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "alarms")
@@ -82,6 +85,7 @@ def test_a_support_bundle_is_made_and_fetched(laptop: Page, bench: Bench, tmp_pa
     assert file.read_bytes()[:2] == b"PK"
 
 
+@pytest.mark.long
 def test_on_a_phone_everything_is_within_the_screen(phone: Page, bench: Bench) -> None:
     page = phone
     for name in ("alarms", "overview", "motion"):

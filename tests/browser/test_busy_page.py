@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.busy_page import block, hold, lasts, resumes_after_release
@@ -12,6 +13,7 @@ from tests.browser.driving import SILENT, Bench, open_axis
 BLOCK_MS = 260
 
 
+@pytest.mark.long
 def test_a_hold_lasts_through_a_busy_moment_and_the_page_says_so(
     laptop: Page, bench: Bench
 ) -> None:
@@ -27,6 +29,7 @@ def test_a_hold_lasts_through_a_busy_moment_and_the_page_says_so(
     expect(page.get_by_text("The signal was interrupted for")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_release_in_a_busy_moment_is_final(laptop: Page, bench: Bench) -> None:
     open_axis(laptop, bench.drive, "motion")
     for _ in range(3):

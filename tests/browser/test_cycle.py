@@ -44,6 +44,7 @@ def machine(station: Station, axis: str) -> Iterator[Any]:
     until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
 
 
+@pytest.mark.long
 def test_a_cycle_is_read_and_shown(page: Page, station: Station, axis: str, machine: Any) -> None:
     panel = tuning.open_panel(page, axis, "Load of the machine's cycle")
     # The tool moves nothing.

@@ -36,6 +36,7 @@ def page(browser: Browser) -> Iterator[Page]:
     context.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "found"),
     [("holding brake", "brake-test.html"), ("working counter", "ethercat.html"), ("抱闸", "zh/")],

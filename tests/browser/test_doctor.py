@@ -99,6 +99,7 @@ CASES: list[tuple[str, str, Callable[[Station], Callable[[], None]]]] = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("url", "cause", "inject"), CASES, ids=[case[1] for case in CASES])
 def test_the_first_cause_is_the_injected_one(
     laptop: Page,
@@ -145,6 +146,7 @@ def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> N
     expect(card).not_to_contain_text(kept, timeout=SLOW_MS)
 
 
+@pytest.mark.long
 def test_settings_to_try_on_a_phone_in_chinese(phone: Page, station: Station) -> None:
     phone.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     phone.reload()

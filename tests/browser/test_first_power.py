@@ -55,6 +55,7 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     next(opened, None)
 
 
+@pytest.mark.long
 def test_exchanged_phases_are_found_and_named(page: Page, station: Station) -> None:
     axis = station.add(1, tuning.URL, name="Spindle")
     tuning.keep_exchanging(page, axis)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
@@ -99,6 +100,7 @@ def test_every_page_suits_a_glove_a_reader_and_both_lights(phone: Page, bench: B
     assert found == [], "\n".join(found)
 
 
+@pytest.mark.long
 def test_no_page_of_a_laptop_breaks_a_rule_in_either_light(laptop: Page, bench: Bench) -> None:
     page = laptop
     page.emulate_media(reduced_motion="reduce")
@@ -142,6 +144,7 @@ def test_what_is_shown_is_not_taken_for_current_without_a_connection(
     expect(state).to_contain_text("Switch on disabled")
 
 
+@pytest.mark.long
 def test_a_page_asked_for_without_a_connection_comes_by_itself(
     laptop: Page, bench: Bench, cable: Cable
 ) -> None:
@@ -160,6 +163,7 @@ def test_a_page_asked_for_without_a_connection_comes_by_itself(
     expect(page.get_by_role("heading", name="Alarms")).to_be_visible()
 
 
+@pytest.mark.long
 def test_only_rows_in_sight_are_drawn(phone: Page, laptop: Page, bench: Bench) -> None:
     for page in (phone, laptop):
         open_axis(page, bench.drive, "parameters")
@@ -218,6 +222,7 @@ def test_scope_draws_and_measures(laptop: Page, bench: Bench) -> None:
     assert all(line.count(",") == 3 for line in lines[1:])
 
 
+@pytest.mark.long
 def test_nothing_moves_under_a_finger_while_a_page_opens(laptop: Page, x: str) -> None:
     """Also where the answers come late: the pages that moved most before they were waited for."""
     open_axis(laptop, x, "overview")

@@ -44,6 +44,7 @@ def axis(station: Station) -> str:
     return left
 
 
+@pytest.mark.long
 def test_what_is_out_of_square_is_named_with_the_next_step(
     page: Page, station: Station, axis: str
 ) -> None:

@@ -39,6 +39,7 @@ def fits(page: Page) -> bool:
     return bool(page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_export_compare_and_what_changed(
     width: str, request: pytest.FixtureRequest, bench: Bench, held: int, tmp_path: Path
@@ -116,6 +117,7 @@ def planted(station: Station, drive: str) -> tuple[bytes, dict[str, int]]:
     return tostring(root), changed
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_thirty_planted_conflicts_are_shown_and_no_other(
     width: str,
@@ -145,6 +147,7 @@ def test_thirty_planted_conflicts_are_shown_and_no_other(
     assert fits(page)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_a_whole_segment_in_one_list(
     width: str, request: pytest.FixtureRequest, station: Station, held: int, tmp_path: Path
@@ -184,6 +187,7 @@ def test_a_whole_segment_in_one_list(
         station.remove(y)
 
 
+@pytest.mark.long
 def test_in_chinese(laptop: Page, held: int) -> None:
     laptop.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     try:

@@ -15,6 +15,7 @@ from tests.browser.test_frame import SIDEWAYS
 EVALUATED_MS = 120_000
 
 
+@pytest.mark.long
 def test_a_recording_becomes_a_response(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "response")
@@ -42,6 +43,7 @@ def test_a_recording_becomes_a_response(laptop: Page, bench: Bench) -> None:
     assert page.evaluate(SIDEWAYS) == 0
 
 
+@pytest.mark.long
 def test_what_is_no_recording_is_refused_in_words(phone: Page, bench: Bench) -> None:
     page = phone
     open_axis(page, bench.drive, "response")

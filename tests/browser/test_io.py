@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.cable import Cable
@@ -12,6 +13,7 @@ from tests.support.machine import within
 from tests.support.station import until
 
 
+@pytest.mark.long
 def test_a_function_is_written_and_a_twin_is_asked_about(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "io")
@@ -75,6 +77,7 @@ def test_forcing_ends_with_stop(laptop: Page, bench: Bench) -> None:
     expect(page.get_by_text("STOP was pressed")).to_be_visible(timeout=REPORTED_MS)
 
 
+@pytest.mark.long
 def test_forcing_ends_with_the_connection(laptop: Page, bench: Bench, cable: Cable) -> None:
     begin_forcing(laptop, bench)
     cable.cut()

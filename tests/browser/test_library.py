@@ -40,6 +40,7 @@ def open_files(page: Page) -> None:
     expect(page.get_by_role("heading", name="Files", level=1)).to_be_visible()
 
 
+@pytest.mark.long
 def test_go_back_to_an_earlier_version(
     laptop: Page, station: Station, bench: Bench, versions: tuple[int, int]
 ) -> None:
@@ -92,6 +93,7 @@ def test_three_way_tells_who_changed_what(
     assert row.get_by_role("checkbox").is_checked()
 
 
+@pytest.mark.long
 def test_tags_search_and_putting_aside(
     phone: Page, station: Station, bench: Bench, versions: tuple[int, int]
 ) -> None:
@@ -163,6 +165,7 @@ def halls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Sta
         server.remove()
 
 
+@pytest.mark.long
 def test_a_measurement_is_shared_and_copied_by_the_buttons(
     browser: Browser, halls: tuple[Station, Station], tmp_path: Path
 ) -> None:

@@ -150,6 +150,7 @@ def _stall(_page: Page, cable: Cable) -> None:
     cable.stall()
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("trouble", [_hide, _blur, _pause, _hang, _leave, _close, _cut, _stall])
 def test_the_jog_ends(laptop: Page, bench: Bench, cable: Cable, trouble: Any) -> None:
     """The button stays pressed; the axis stops all the same."""
@@ -205,6 +206,7 @@ def _start_sequence(page: Page, bench: Bench) -> None:
     bench.wait_moving()
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("where", ["motion", "parameters", "scope", "rerun", "connect", "files"])
 def test_stop_on_every_page(laptop: Page, bench: Bench, where: str) -> None:
     page = laptop
@@ -256,6 +258,7 @@ def test_state_machine_picture_drives_the_axis(laptop: Page, bench: Bench) -> No
     until(lambda: bench.state()["state"] == "Switch on disabled", what="disabled")
 
 
+@pytest.mark.long
 def test_fault_shows_cause_and_remedy(laptop: Page, bench: Bench) -> None:
     page = laptop
     bench.station.drives.command(do="inject", axis="X", what="over_temperature")

@@ -15,6 +15,7 @@ from tests.support.station import until
 SETTING = "200B:07"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("key", ["6040:00", "6060:00", "60FF:00"])
 def test_what_moves_is_not_written_in_the_table(laptop: Page, bench: Bench, key: str) -> None:
     page = laptop
@@ -67,6 +68,7 @@ def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: B
     assert any("test of the supply" in entry["text"] for entry in log)
 
 
+@pytest.mark.long
 def test_with_power_it_is_not_written(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw(SETTING)

@@ -43,6 +43,7 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
         running.stop()
 
 
+@pytest.mark.long
 def test_import_from_the_connect_page(laptop: Page, station: Station, tmp_path: Path) -> None:
     text = export_eds(load_profile("generic402"), datetime(2020, 1, 2), "nova.eds")
     text = text.replace("VendorName=any", "VendorName=Nova").replace("=CiA 402 drive", "=N-400")

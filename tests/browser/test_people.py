@@ -114,6 +114,7 @@ def test_nothing_is_shown_before_the_log_in(opened: Open, bench: Bench) -> None:
 # --- control --------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_control_is_asked_for_handed_over_and_overridden(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     anna = person(opened, bench, Role.ADMINISTRATOR)
@@ -152,6 +153,7 @@ def test_control_is_asked_for_handed_over_and_overridden(opened: Open, bench: Be
     expect(button(olaf, "Control is free")).to_be_visible(timeout=2_500)
 
 
+@pytest.mark.long
 def test_a_viewer_moves_nothing_and_can_stop(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     vera = person(opened, bench, Role.VIEWER)
@@ -214,6 +216,7 @@ def write_markup_everywhere(station: Station, bench: Bench) -> None:
     ask.delete(f"/scope/setups/{MARKUP.replace(' ', '%20')}")
 
 
+@pytest.mark.long
 def test_markup_stays_text_on_every_page(opened: Open, station: Station, bench: Bench) -> None:
     write_markup_everywhere(station, bench)
     page = log_in(opened(""), Role.ADMINISTRATOR)
@@ -271,6 +274,7 @@ def end_visit(host: Page) -> None:
     button(host, "End the session").first.click()
 
 
+@pytest.mark.long
 def test_a_guest_looks_and_is_seen_and_nothing_more(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     guest = invited(olaf, opened, bench)
@@ -389,6 +393,7 @@ def test_a_guest_moves_only_while_the_button_on_site_is_held(opened: Open, bench
     end_visit(olaf)
 
 
+@pytest.mark.long
 def test_the_end_of_the_visit_stops_the_guest_at_once(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     anna = person(opened, bench, Role.ADMINISTRATOR)
@@ -407,6 +412,7 @@ def test_the_end_of_the_visit_stops_the_guest_at_once(opened: Open, bench: Bench
     bench.wait_standing()
 
 
+@pytest.mark.long
 def test_a_page_on_site_that_goes_away_stops_the_guest(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     guest = invited(olaf, opened, bench, "move")
@@ -419,6 +425,7 @@ def test_a_page_on_site_that_goes_away_stops_the_guest(opened: Open, bench: Benc
     end_visit(anna)
 
 
+@pytest.mark.long
 def test_a_guest_whose_browser_closes_stops_the_axis(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     guest = invited(olaf, opened, bench, "move")
@@ -430,6 +437,7 @@ def test_a_guest_whose_browser_closes_stops_the_axis(opened: Open, bench: Bench)
     end_visit(olaf)
 
 
+@pytest.mark.long
 def test_a_guest_who_may_only_look_can_stop(opened: Open, bench: Bench) -> None:
     olaf = person(opened, bench, Role.OPERATOR)
     guest = invited(olaf, opened, bench)

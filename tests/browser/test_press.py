@@ -59,6 +59,7 @@ def _finger(page: Page, x: float, y: float) -> Press:
     return lambda: event("touchStart", {"x": x, "y": y}), lambda: event("touchEnd")
 
 
+@pytest.mark.long
 def test_no_moment_shows_a_press_another_place(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "motion")
@@ -75,6 +76,7 @@ def test_no_moment_shows_a_press_another_place(laptop: Page, bench: Bench) -> No
     assert page.evaluate("window.found") == []
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("screen", ["laptop", "phone"])
 def test_a_press_acts_on_what_it_began_on(
     screen: str, request: pytest.FixtureRequest, bench: Bench

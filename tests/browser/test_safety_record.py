@@ -32,6 +32,7 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     next(opened, None)
 
 
+@pytest.mark.long
 def test_a_function_is_recorded_and_signed(page: Page, station: Station) -> None:
     axis = station.add(1, tuning.URL, name="Spindle")
     tuning.keep_exchanging(page, axis)

@@ -34,6 +34,7 @@ def moved(card: Locator) -> int:
     return int(found[1]) if found else 0
 
 
+@pytest.mark.long
 def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None:
     page, drive = laptop, station.add(5, CAN, "generic402", "N")
     open_axis(page, drive, "overview")

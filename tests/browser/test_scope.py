@@ -142,6 +142,7 @@ def peaks(page: Page) -> list[tuple[float, float]]:
     return [(hertz, amplitude) for hertz, amplitude in found]
 
 
+@pytest.mark.long
 def test_a_step_is_caught_and_the_cursors_read_it(
     page: Page, station: Station, cyclic: str
 ) -> None:
@@ -184,6 +185,7 @@ def test_a_step_is_caught_and_the_cursors_read_it(
     soon(lambda: float(cursor_b.input_value()), pytest.approx(0.45, abs=0.01), "B is dragged")
 
 
+@pytest.mark.long
 def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cyclic: str) -> None:
     amplitude, hertz = 0.05, 7.0
     add_channel(page, "607A")
@@ -230,6 +232,7 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
         expect(page.get_by_role("img", name=tab)).to_be_visible()
 
 
+@pytest.mark.long
 def test_timing_is_reported_and_follows_the_exchange(
     page: Page, station: Station, axis: str
 ) -> None:
@@ -243,6 +246,7 @@ def test_timing_is_reported_and_follows_the_exchange(
     assert page.get_by_text("no data for").count() == 0
 
 
+@pytest.mark.long
 def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, cable: Cable) -> None:
     expect(page.locator(f'[data-trace="{VELOCITY}"] .timing')).to_contain_text("synchronous")
     until(lambda: number(figure(page, VELOCITY, "rms")) >= 0, HANG_S)
@@ -435,6 +439,7 @@ def one_finger_moves_cursors(page: Page) -> None:
     page.get_by_role("button", name="Cursors").click()
 
 
+@pytest.mark.long
 def test_on_a_phone(browser: Browser, cable: Cable, axis: str) -> None:
     for page in _open(browser, cable.url, **PHONE):
         page.evaluate("location.hash = '#/scope'")

@@ -59,6 +59,7 @@ def axis(station: Station) -> str:
     return station.add(1, tuning.URL, name="Arm")
 
 
+@pytest.mark.long
 def test_a_shaper_is_verified_and_shown(page: Page, station: Station, axis: str) -> None:
     # The slow mode needs no faster cycle, and the computer of the tests has less to do.
     cycle = {"url": tuning.URL, "cycle_us": 4000}
@@ -84,6 +85,7 @@ def test_a_shaper_is_verified_and_shown(page: Page, station: Station, axis: str)
     expect(played).to_contain_text("/")
 
 
+@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "指令整形")

@@ -86,6 +86,7 @@ def turned_rpm(bench: Bench) -> float:
     return float(abs(end - start) / (ended_s - began_s) * 60)
 
 
+@pytest.mark.long
 def test_an_axis_that_turns_unasked_is_reported_on_every_page(
     laptop: Page, pulled: Bench, station: Station
 ) -> None:

@@ -91,6 +91,7 @@ def press(page: Page, name: str) -> None:
     card(page).get_by_role("button", name=name, exact=True).click()
 
 
+@pytest.mark.long
 def test_the_demo_opens_on_an_ethercat_axis_with_a_load(demo: Demo, laptop: Page) -> None:
     drives = demo.ask("/drives")
     assert [drive["ports"][0]["kind"] for drive in drives] == ["ethercat"] * 3
@@ -104,6 +105,7 @@ def test_the_demo_opens_on_an_ethercat_axis_with_a_load(demo: Demo, laptop: Page
     assert demo.jobs() == []
 
 
+@pytest.mark.long
 def test_the_tour_by_itself_moves_nothing_and_can_be_left(demo: Demo, phone: Page) -> None:
     page = phone
     before = demo.fresh()["position"]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Bench, open_axis
 from tests.support.station import until
 
 
+@pytest.mark.long
 def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("6092:01")
@@ -129,6 +131,7 @@ def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
     expect(picture).to_contain_text("50 ms")
 
 
+@pytest.mark.long
 def test_the_watch_list_is_live_and_stays(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "overview")

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from backend.axes.parameters import set_file
 from tests.docs.pages import DOCS
 from tests.support.station import Station
@@ -26,6 +28,7 @@ def run(station: Station, *words: str, code: int = 0) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.long
 def test_settings_of_every_drive_are_stored(station: Station, tmp_path: Path) -> None:
     drive = station.add(1, name="X")
     printed = run(station, "backup_all.py", str(tmp_path))
@@ -35,6 +38,7 @@ def test_settings_of_every_drive_are_stored(station: Station, tmp_path: Path) ->
     station.remove(drive)
 
 
+@pytest.mark.long
 def test_inertia(station: Station) -> None:
     drive = station.add(1, "ethercat://virtual0", name="G")
     printed = run(station, "inertia.py", drive, "3", "1200", "80")

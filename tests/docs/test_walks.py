@@ -43,6 +43,7 @@ def call(shown: Shown) -> None:
     assert missing is None, f"{where}\nthe page shows: {missing}\nit printed:\n{done.output}"
 
 
+@pytest.mark.long(keep=["how-to/jog-and-home.md"])
 @pytest.mark.timeout(400)  # tuning computes for half a minute on a free machine
 @pytest.mark.parametrize("page", PAGES)
 def test_page_is_followed(

@@ -69,6 +69,7 @@ async def station(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("loss", [emptied, removed, replaced])
 @pytest.mark.parametrize("accounts", [None, True])
 async def test_without_its_accounts_it_does_not_start(
@@ -94,6 +95,7 @@ async def test_a_damaged_note_is_a_note(station: Path, damage: bytes) -> None:
         await accounts_needed(station, Serving())
 
 
+@pytest.mark.long
 async def test_recovery_is_on_purpose(station: Path) -> None:
     """What the message names, in the terminal of the machine; afterwards all is as before."""
     removed(station)
@@ -170,6 +172,7 @@ def serve(folder: Path) -> subprocess.Popen[str]:
     )
 
 
+@pytest.mark.long
 @pytest.mark.timeout(400)  # four starts of the whole program
 def test_a_second_server_on_a_folder_does_not_start(tmp_path: Path) -> None:
     """Also where the first one has just made the folder; and not for longer than the first runs."""

@@ -108,6 +108,7 @@ def test_slow_heads_are_closed_and_do_not_keep_others_out(
             line.close()
 
 
+@pytest.mark.long
 def test_who_does_not_read_the_answers_is_cut_off(
     server: GuardedServer, cast: Cast, monkeypatch: pytest.MonkeyPatch
 ) -> None:

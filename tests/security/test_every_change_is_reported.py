@@ -72,6 +72,7 @@ def through_wrapper(operation: str, body: bytes, status: int = 200) -> list[Fact
     return heard.facts
 
 
+@pytest.mark.long
 def test_each_change_is_reported_by_one_or_the_other(server: GuardedServer) -> None:
     assert REPORTED_THERE <= CHANGING
     assert CHANGES_NOTHING <= CHANGING
@@ -301,6 +302,7 @@ def agrees(entry: Mapping[str, Any], reported: Mapping[str, object]) -> bool:
     )
 
 
+@pytest.mark.long
 def test_each_change_tells_who_did_what_from_what_to_what(
     server: GuardedServer, cast: Cast
 ) -> None:

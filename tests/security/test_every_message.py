@@ -78,6 +78,7 @@ def expected(kind: str, rights: frozenset[Right]) -> bool:
     return need in rights
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("who", ["administrator", "operator", "viewer", "guest", "reader"])
 def test_everybody_sends_what_they_may_and_nothing_else(
     server: GuardedServer, cast: Cast, who: str
@@ -312,6 +313,7 @@ def test_a_closed_connection_ends_what_it_began(server: GuardedServer, cast: Cas
     until(lambda: job.state == "cancelled", 3, "the job has ended")
 
 
+@pytest.mark.long
 def test_a_line_that_is_dead_but_open_moves_nothing_and_is_given_up(
     server: GuardedServer, cast: Cast
 ) -> None:

@@ -93,6 +93,7 @@ def test_a_forged_token_is_nobody_even_with_a_good_cookie(
     assert basic.status_code == 401
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("who", ["administrator", "operator", "viewer", "guest", "reader"])
 def test_everybody_passes_what_they_may_and_nothing_else(
     server: GuardedServer, cast: Cast, who: str
@@ -152,6 +153,7 @@ FOREIGN = [
 ]
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("headers", FOREIGN, ids=str)
 def test_other_pages_reach_nothing(
     server: GuardedServer, cast: Cast, headers: dict[str, str]

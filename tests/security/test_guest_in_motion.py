@@ -64,6 +64,7 @@ def require_ended(server: GuardedServer, job: Job) -> None:
     assert server.call(lambda: server.bench.authority.mover_of("x")) is None
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("rights", "drive"),
     [(frozenset({Right.PARAMETERS}), "x"), (frozenset({Right.MEASURE}), None), (MOVES, "y")],

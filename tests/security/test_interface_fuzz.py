@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 import requests
 import schemathesis
 from hypothesis import HealthCheck, Phase, given, seed, settings
@@ -34,6 +35,7 @@ def line() -> requests.Session:
     return session
 
 
+@pytest.mark.long
 def test_the_interface_keeps_to_its_description(server: GuardedServer) -> None:
     session = line()
     schema = schemathesis.openapi.from_dict(server.interface)

@@ -46,6 +46,7 @@ def test_a_key_is_its_own_key(name: str) -> None:
     assert name_key(name_key(name)) == name_key(name)
 
 
+@pytest.mark.long
 def test_padding_a_locked_name_gives_no_further_guess(server: GuardedServer) -> None:
     """28 ways to write a locked name were 27 more guesses: found by one key, counted by another."""
     server.run(server.people.accounts.add("vw", PASSWORD, Role.VIEWER))
@@ -326,6 +327,7 @@ async def test_places_are_bounded() -> None:
     assert sum(isinstance(each, TooOften) for each in ended) == 5
 
 
+@pytest.mark.long
 def test_a_right_password_does_not_wait_for_eighty_guesses(tmp_path: Path) -> None:
     """80 guesses at once delayed a right one by 80 hashes (12 s)."""
     server = GuardedServer(tmp_path).start()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from backend.foundation.people.identity import Actor, Identity, acting
 from backend.foundation.people.rights import Right, Role
 from backend.foundation.work.jobs import Job
@@ -55,6 +57,7 @@ def test_a_role_that_may_still_move_ends_nothing(guarded: GuardedServer) -> None
     require_ended(guarded, job)
 
 
+@pytest.mark.long
 def test_the_motion_of_another_goes_on(guarded: GuardedServer) -> None:
     job = begin(guarded, guarded.log_in(Role.OPERATOR))
     other = guarded.token(Role.ADMINISTRATOR, Right.MOTION)

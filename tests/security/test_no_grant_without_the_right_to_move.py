@@ -61,6 +61,7 @@ def _everything(caller: Caller) -> None:
         caller.http.request(method, f"{caller.server.url}{where}", **options)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rights", WITHOUT, ids="+".join)
 def test_no_route_gives_a_grant_to_who_may_not_move(
     server: GuardedServer, rights: tuple[Right, ...]

@@ -172,6 +172,7 @@ def require_reported(problem: dict[str, Any], key: str) -> None:
     assert "/api/v1/drives/" in problem["remedy"], problem
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("wired", [False, True], ids=["inputs-off", "inputs-on"])
 def test_no_write_by_anybody_moves_the_axis(scene: Scene, wired: bool) -> None:
     """Every writable object at several values, by the table's own route, one after the other."""
@@ -225,6 +226,7 @@ def loaded(scene: Scene, caller: Caller, file: str, keys: list[str]) -> dict[str
     return {row["key"]: row for row in result["rows"]} | {"": result}
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("way", ["set", "csv", "undo"])
 def test_no_set_moves_the_axis(scene: Scene, way: str) -> None:
     """A set, a CSV list and the undo of a set, loaded by a script with the right to write."""
@@ -271,6 +273,7 @@ def test_no_set_moves_the_axis(scene: Scene, way: str) -> None:
     scene.require_still(f"after {way}")
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("where", ["local", "server"])
 def test_the_command_line_moves_nothing(
     scene: Scene, where: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

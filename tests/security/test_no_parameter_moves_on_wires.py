@@ -232,6 +232,7 @@ def require_refused(problem: dict[str, Any], key: str) -> None:
     assert "/api/v1/drives/" in problem["remedy"], problem
 
 
+@pytest.mark.long(keep=1)
 def test_no_write_moves_an_axis_on_a_real_wire(wires: Wires) -> None:
     """All drives at once, as pages of several people would."""
     places = wires.places

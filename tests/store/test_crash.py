@@ -148,6 +148,7 @@ def check(folder: Path, database: str, reported: list[dict[str, Any]]) -> None:
             assert raw.execute("PRAGMA foreign_key_check").fetchall() == []
 
 
+@pytest.mark.long
 def test_killed_at_any_moment(database: str, tmp_path: Path) -> None:
     dice = random.Random(SEED)
     with nursery(tmp_path, database) as lives:
@@ -160,6 +161,7 @@ def test_killed_at_any_moment(database: str, tmp_path: Path) -> None:
     assert set(acts) == {"save", "event", "file", "change"}, "every kind of writing was hit"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("act", "database"),
     [
@@ -186,6 +188,7 @@ def test_cut_off_at_every_step_to_the_disk(act: str, database: str, tmp_path: Pa
     assert step > 3, "there are steps at which it can be cut off"
 
 
+@pytest.mark.long
 def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_path: Path) -> None:
     dice, url = random.Random(SEED), postgres.new_database()
     folders = [tmp_path / "a", tmp_path / "b"]

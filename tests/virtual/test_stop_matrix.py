@@ -33,6 +33,7 @@ PART = [
 ]
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(("family", "motion", "trouble"), PART)
 def test_stop_brings_the_shaft_to_rest_or_says_that_it_turns(
     family: str, motion: str, trouble: str

@@ -41,6 +41,7 @@ BRAKE_DOORS = {
 }  # fmt: skip
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(("family", "motion", "trouble"), PART)
 def test_stop_lets_no_load_fall(family: str, motion: str, trouble: str) -> None:
     found = vertical.run_vertical(family, motion, trouble)
@@ -99,6 +100,7 @@ def test_a_drive_that_ignores_its_quick_stop_is_held_by_its_brake() -> None:
     run_simulated(main)
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("family", sorted(BRAKE_DOORS))
 def test_no_parameter_write_releases_the_brake_of_a_load_that_hangs(family: str) -> None:
     """Also while process data are exchanged, in which an EP3E follows bit 0 of 60FEh."""

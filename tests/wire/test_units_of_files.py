@@ -117,6 +117,7 @@ async def test_the_drive_counts_more_than_the_file() -> None:
     assert (found.raw_per_unit, found.raw_unit, found.origin) == (10.0, "0.1 rpm", Origin.DRIVE)
 
 
+@pytest.mark.long
 async def test_canopen_commands_60_for_60_rpm() -> None:
     """The RPDO with 60FFh, as it goes out on the bus."""
     async with can_bench(spec(velocity_unit=RPM), drive="generic402", pace=20.0) as b:

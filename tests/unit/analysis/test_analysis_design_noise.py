@@ -40,6 +40,7 @@ def noisy(seed):
     return MeasuredPlant(f, np.exp(off[0] + 1j * off[1]), MODEL, 400.0)
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_noise_does_not_choose_between_one_notch_and_two():
     """One seed or another was worth a per cent or not: 70 Hz with one notch, 83 Hz with two."""

@@ -27,6 +27,7 @@ def matches(found, mechanics, low_hz, high_hz):
             assert near[1] == pytest.approx(z, rel=0.15)
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("mechanics", [RIGID, ONE, THREE, STIFF, VERTICAL], ids=range(5))
 def test_torque_mode_at_4_khz(mechanics):
     m = measure(mechanics, 4000.0)
@@ -40,6 +41,7 @@ def test_torque_mode_at_4_khz(mechanics):
     matches(found, mechanics, 20.0, 1000.0 if len(mechanics.loads) < 3 else 300.0)
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("mechanics", [RIGID, ONE, TWO, THREE, HEAVY], ids=range(5))
 def test_torque_mode_at_1_khz_direct_and_model(mechanics):
     m = measure(mechanics, 1000.0)
@@ -62,6 +64,7 @@ def test_torque_mode_at_1_khz_direct_and_model(mechanics):
     assert np.median(np.abs(np.degrees(np.angle(ratio)))) < 4.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mechanics", "loop_hz", "position"),
     [
@@ -107,6 +110,7 @@ def test_friction_found_and_removed():
     assert none.coulomb_nm < 0.002
 
 
+@pytest.mark.long
 def test_a_delay_of_cycles_is_found():
     m = measure(TWO, 1000.0)
     late = tuple(

@@ -38,6 +38,7 @@ def measured(seed: int) -> Frf:
     )  # fmt: skip
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("seed", range(4))
 def test_lines_that_hide_the_whole_inertia_leave_what_moves_reported_of_it(seed: int) -> None:
     frf, whole = measured(seed), MOTOR + LOAD
@@ -58,6 +59,7 @@ def test_an_inertia_that_moves_hardly_reported_holds_nothing() -> None:
     assert model.gain == pytest.approx(plain.gain, rel=0.1)
 
 
+@pytest.mark.long
 def test_without_the_inertia_such_lines_leave_it_open() -> None:
     found = [fit_sampled_model(measured(n), PATH, max_modes=2).fit.model.gain for n in range(4)]
     assert max(abs(np.log(g * (MOTOR + LOAD))) for g in found) > 0.15

@@ -79,6 +79,7 @@ def contains(interval, truth):
     return interval.low <= truth <= interval.high
 
 
+@pytest.mark.long
 def test_soft_axes_are_right_or_say_that_they_are_not():
     """Of all that is identified, J is within 2 %, Coulomb friction within 10 % (tuning.md,
     section 3), and the intervals contain the truth of J and both frictions.

@@ -43,6 +43,7 @@ def records_of(case):
     )
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("cycles", "interpolates"), [(0.0, True), (1.0, False), (1.5, False), (2.4, True)]
 )
@@ -98,6 +99,7 @@ def test_a_delay_just_short_of_whole_cycles_is_found():
     assert best.command_delay_s == pytest.approx(39 * 50e-6, abs=5e-6)
 
 
+@pytest.mark.long
 def test_a_noisy_loop_leaves_no_uncertainty_of_whole_cycles():
     """A quarter of the torque is the loop's answer to noise, which looks like other paths, too."""
     case = case_of(1000.0, late_steps=0, current_hz=1400.0, loop_hz=30.0, counts_per_rev=2**20,
@@ -115,6 +117,7 @@ def test_a_noisy_loop_leaves_no_uncertainty_of_whole_cycles():
     assert e.phase_deg < 3.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("late_steps", [20, 36])
 def test_beside_a_closed_loop_path_and_mechanics_find_each_other(late_steps):
     case = case_of(1000.0, late_steps=late_steps, loop_hz=15.0)
@@ -153,6 +156,7 @@ def test_friction_is_found_behind_a_coarse_encoder():
     assert found.coulomb_nm == pytest.approx(ONE.coulomb_nm, rel=0.15)
 
 
+@pytest.mark.long
 def test_a_delay_of_two_and_a_half_cycles_spoils_nothing():
     case = case_of(1000.0, late_steps=47, current_hz=1500.0)
     found = result_of(case, played(case))
@@ -230,6 +234,7 @@ def test_what_else_may_be_true_widens_the_band():
     assert left.valid_band_hz[1] == pytest.approx(100.0)
 
 
+@pytest.mark.long
 def test_a_filtered_torque_costs_no_search_with_its_own_path(monkeypatch):
     """6077h behind 1 ms: its lag is no current loop's, and mechanics behind it explain nothing."""
     case = case_of(1000.0, late_steps=0, current_hz=1000.0)

@@ -6,6 +6,7 @@ from random_axes import errors, missed_modes, played, random_case, result_of
 
 # By the seed's remainder of six: plain, close resonances, hardly damped, vertical with a closed
 # loop, a delay of two cycles, a coarse encoder.
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("seed", "rate"),
     [(24, 1000.0), (25, 1000.0), (2, 4000.0), (27, 1000.0), (10, 1000.0), (23, 1000.0)],

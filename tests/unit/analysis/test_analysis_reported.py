@@ -128,6 +128,7 @@ def recorded_finely():
     return tuple(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("filter_hz", [None, 1000.0])
 @pytest.mark.parametrize("reported", [_late_mean, _triangle, _observer])
 def test_a_speed_that_no_lag_explains_is_not_used(reported, filter_hz):
@@ -192,6 +193,7 @@ def recorded_beside_loop(loop_hz, *, demand):
     return tuple(found)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("known_hz", [None, 1000.0])
 @pytest.mark.parametrize("demand", [True, False])
 def test_a_demand_beside_a_loop_passes_the_current_loop_too(demand, known_hz):

@@ -52,6 +52,7 @@ def rubbed():
     return case, *_found(case)
 
 
+@pytest.mark.long
 def test_strong_friction_hardly_damps_a_soft_mode(rubbed):
     case, found, _ = rubbed
     [(hz, zeta)], _ = case.mechanics.modes()
@@ -71,6 +72,7 @@ def test_where_friction_rules_the_lines_are_right_and_their_band_holds(rubbed):
     assert low.covered >= 0.9
 
 
+@pytest.mark.long
 def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, monkeypatch):
     """Directions some cycles too late take the wrong friction, and damp the mode instead."""
     case, found, records = rubbed
@@ -161,6 +163,7 @@ def test_a_damping_that_is_not_known_to_half_of_itself_may_be_none():
     assert high == pytest.approx(0.04352)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_motor_alone_has_no_resonance(seed):
     case = _case(Mechanics(5e-5, (), 2e-4, 0.03), 10.0)

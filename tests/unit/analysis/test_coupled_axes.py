@@ -149,6 +149,7 @@ def test_torques_that_the_loops_make_of_noise_do_not_bias_the_response():
     assert np.median(np.linalg.norm(mean - truth, axis=(1, 2)) / size) < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [(2e-3, 5e-4), (1e-2, 5e-3)])
 def test_intervals_of_the_entries_hold_the_truth_in_95_of_100_draws(noise):
     plant, rng = Gantry(), np.random.default_rng(3)
@@ -231,6 +232,7 @@ def test_common_and_differential_motion_of_a_symmetric_gantry_are_apart():
     assert abs(found.response[0, 0, 0] / rigid - 1.0) < 0.02
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     "plant",
     [
@@ -261,6 +263,7 @@ def static_stiffness(plant):
     return 1.0 / float(difference @ compliance @ difference)
 
 
+@pytest.mark.long
 def test_intervals_of_modes_inertia_and_skew_stiffness_hold_the_truth_in_95_of_100_draws():
     plant, rng = Gantry(), np.random.default_rng(7)
     truth = [mode for mode in plant.modes() if 4.0 < mode[0] < 230.0]
@@ -370,6 +373,7 @@ def test_beyond_the_band_nothing_is_stated():
     )
 
 
+@pytest.mark.long
 def test_the_interval_of_ms_holds_the_truth_in_95_of_100_draws():
     plant, rng = Gantry(), np.random.default_rng(9)
     c = controllers(LINES.astype(float), delay_s=1e-3)
@@ -382,6 +386,7 @@ def test_the_interval_of_ms_holds_the_truth_in_95_of_100_draws():
     assert np.mean(inside) >= 0.93
 
 
+@pytest.mark.long
 def test_a_design_keeps_its_goals_for_the_true_machine():
     plant, rng = Gantry(), np.random.default_rng(10)
     c = controllers(LINES.astype(float), delay_s=1e-3)

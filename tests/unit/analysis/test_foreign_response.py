@@ -26,6 +26,7 @@ def real(column_in: int, column_out: int) -> tuple[np.ndarray, np.ndarray]:
     return table[:, column_in], table[:, column_out]
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("column_in", [1, 2])
 def test_the_real_bench_has_its_modes(column_in: int) -> None:
     found = evaluate(*real(column_in, 3), RATE)
@@ -122,6 +123,7 @@ def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
         assert share_held(found, bench, torque, lines) >= 0.9, name
 
 
+@pytest.mark.long
 def test_noise_and_chirp_are_reported_and_hold_the_truth() -> None:
     bench = Bench(noise=2e-3, damping=0.04)
     n = round(16 * RATE)
@@ -194,6 +196,7 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize("kind", ["white", "random walk", "slow input", "chirp"])
 @pytest.mark.parametrize("n", [4000, 20000])
 def test_an_output_without_relation_to_the_input_has_no_response(kind: str, n: int) -> None:
@@ -225,6 +228,7 @@ def test_the_band_ends_where_the_output_no_longer_follows() -> None:
         assert found.modes == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periods", [1, 8])
 @pytest.mark.parametrize(
     ("of_input", "of_output", "code"),
@@ -281,6 +285,7 @@ def test_the_excitation_is_found_as_recordings_hold_it(name: str) -> None:
     assert find_excitation(signal).kind == kind
 
 
+@pytest.mark.long
 def test_a_recording_with_silence_around_is_evaluated_by_its_periods() -> None:
     bench = Bench(noise=1e-4)
     torque = EXCITED["before and after nothing"][0]

@@ -142,6 +142,7 @@ def test_what_turns_slowly_from_period_to_period_counts_as_fewer_periods() -> No
     assert np.sqrt(np.mean(off**2)) < 2.0 * np.median(found.noise)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("bandwidth_hz", [10.0, 40.0])
 def test_a_closed_loop_with_noise_has_a_band_for_its_feedback(bandwidth_hz: float) -> None:
     """A PI loop answers a disturbance of a tenth of the excitation."""
@@ -190,6 +191,7 @@ def test_torque_and_speed_of_one_shaft_are_never_refuted_by_the_fit_alone() -> N
     assert contradiction(found, None, path_delay_s(found.fit.model, None)) is None
 
 
+@pytest.mark.long
 def test_a_resonance_below_the_load_is_no_part_of_the_inertia() -> None:
     """A fit put 5.10 and 6.24 Hz into the noise of the lowest lines: 33 % of the inertia."""
     rate = 1000

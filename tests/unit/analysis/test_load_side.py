@@ -34,6 +34,7 @@ from tests.unit.analysis.two_sided_cases import (
 pytestmark = pytest.mark.timeout(600)
 
 
+@pytest.mark.long
 def test_backlash_is_within_five_percent_or_two_counts_in_nine_of_ten_axes() -> None:
     found = [(case, each.backlash_rad) for case, each in campaign() if each.backlash_rad]
     assert len(found) >= 40

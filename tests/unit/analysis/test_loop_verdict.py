@@ -316,6 +316,7 @@ def delayed(crossover_hz: float, late_s: float, factor: float) -> tuple[float, f
     return float(20 * np.log10(1.0 / (4 * f * d))), 90.0 - 360.0 * f * d, float(peak)
 
 
+@pytest.mark.long
 def test_a_raised_gain_keeps_only_loops_that_no_line_told_but_are_sound() -> None:
     """A loop late by up to 200 µs and 1.5 dB stronger: no line shows it, its gain is raised.
 

@@ -130,6 +130,7 @@ def two_inertias(f: np.ndarray, mode_hz: float, ratio: float, damping: float) ->
     return np.abs(top / bottom / s)
 
 
+@pytest.mark.long
 def test_a_mode_of_two_inertias_is_found_with_an_interval_that_holds() -> None:
     """Levels scatter by 5 %; the inertias' ratio, damping, mode and speeds are drawn."""
     inside, found_in, rounds = 0, 0, 60
@@ -151,6 +152,7 @@ def test_a_mode_of_two_inertias_is_found_with_an_interval_that_holds() -> None:
     assert inside >= 0.92 * found_in
 
 
+@pytest.mark.long
 def test_levels_without_a_mode_show_none() -> None:
     """Slopes, a broad hump of a speed loop, scatter, and levels that are noise alone."""
     for seed in range(40):

@@ -58,6 +58,7 @@ def large(objects: int) -> bytes:
     ).encode()
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("objects", [500, 16_000])
 def test_time_and_memory_of_a_large_file(tmp_path: Path, objects: int) -> None:
     """A series of drives, and one drive with as many objects as the maker's range holds."""

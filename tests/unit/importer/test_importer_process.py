@@ -112,6 +112,7 @@ def test_edits_count_at_once_and_slips_spoil_one_profile_only(folder: Path) -> N
     assert "good" not in known
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of a process' memory")
 @pytest.mark.parametrize(
     "task",

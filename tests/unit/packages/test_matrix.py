@@ -20,7 +20,6 @@ REPORT = """\
 <testcase classname="tests.unit.computer.test_other_system" name="test_one"/>
 </testsuite></testsuites>
 """
-AGAIN = '<testsuite><testcase classname="tests.unit.test_b" name="test_one"/></testsuite>'
 
 
 def reported(folder: Path, **texts: str) -> dict[str, matrix.Ran]:
@@ -38,11 +37,6 @@ def row(name: str, *lacking: str) -> Row:
 )
 def test_only_what_has_passed_counts_as_tested(name: str, said: str, tmp_path: Path) -> None:
     assert matrix.cell(row(name), HERE, reported(tmp_path, first=REPORT)) == said
-
-
-def test_what_failed_and_then_passed_alone_has_passed(tmp_path: Path) -> None:
-    ran = reported(tmp_path, first=REPORT, second=AGAIN)
-    assert matrix.cell(row("b"), HERE, ran) == TESTED
 
 
 def test_windows_is_imported_only_where_that_ran_and_lacks_what_it_refuses(tmp_path: Path) -> None:

@@ -321,6 +321,7 @@ def test_an_existing_file_is_never_overwritten(
     assert [each.name for each in tmp_path.iterdir()] == ["a.sdrec"]
 
 
+@pytest.mark.long
 def test_sixteen_channels_at_4_khz_lose_nothing(tmp_path: Path) -> None:
     """Ten seconds of four axes, four times faster than they come; the queue stays small."""
     axes, rows, seconds = 4, 160, 10

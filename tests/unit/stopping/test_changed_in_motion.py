@@ -120,6 +120,7 @@ async def stops_by_braking(bench: Rig) -> None:
 MOTIONS = {"jog": jogging, "another tool": profile_velocity}
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("way", [one_by_one, at_once, by_set, by_csv])
 def test_limits_are_refused_in_motion(motion: str, way: Way) -> None:
@@ -137,6 +138,7 @@ def test_limits_are_refused_in_motion(motion: str, way: Way) -> None:
     run_simulated(main)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_the_undo_of_a_set_is_refused_in_motion(motion: str) -> None:
     """The backup that loading a set keeps holds what was before it: here the dangerous values."""

@@ -392,6 +392,7 @@ def test_overload_at_twice_the_rated_torque(name: str, code: str) -> None:
     resets(d, fault)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("action", "state"), [(0, FAULT), (1, OPERATING)])
 def test_overload_of_the_m6l_does_what_p10_06_says(action: int, state: int) -> None:
     """000:3476: fault and coast, or an alarm in bit 7; reset after 60 s only (000:3882)."""
@@ -555,6 +556,7 @@ def every_entry() -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.long(keep=23)
 @pytest.mark.parametrize(("name", "code"), every_entry())
 def test_every_entry_of_every_table_can_be_raised_and_ends_as_it_says(name: str, code: str) -> None:
     d = OnWire(name, None)

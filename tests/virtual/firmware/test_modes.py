@@ -476,6 +476,7 @@ def home(b: Bench, method: int) -> float:
 EDGE = 0.002
 
 
+@pytest.mark.long(keep=16)
 @pytest.mark.parametrize("start", [-1.0, 0.4, 1.2])
 @pytest.mark.parametrize(
     ("method", "zero"),

@@ -66,6 +66,7 @@ def test_a_belt_that_slips_is_in_the_truth() -> None:
     assert true[1] == pytest.approx(analytic_response(spec, f)[1], rel=0.01)
 
 
+@pytest.mark.long
 async def test_a_filtered_torque_is_recognised_on_a_drive() -> None:
     """As issue 20 found it: 19° and 6.8 dB wrong, trusted, where 6077h passes a 1 ms filter."""
     spec = mechanics((1e-4, 20.0, 0.002)).model_copy(
@@ -82,6 +83,7 @@ async def test_a_filtered_torque_is_recognised_on_a_drive() -> None:
     assert "as assumed" in table([{"kind": "as assumed", "tally": asdict(tally)}])
 
 
+@pytest.mark.long
 async def test_held_set_points_beside_60c2h_are_recognised_on_a_drive() -> None:
     """13° to 48° wrong and trusted before, as the object's presence was mistaken for linear."""
     spec = mechanics((1e-4, 20.0, 0.002)).model_copy(
@@ -96,6 +98,7 @@ async def test_held_set_points_beside_60c2h_are_recognised_on_a_drive() -> None:
     assert np.mean(tally.held["phase"]) > 0.9
 
 
+@pytest.mark.long
 async def test_a_copied_torque_gives_an_ordinary_path_on_a_drive() -> None:
     """Beside friction a slow torque fitted a little better: 0.8 dB wrong, 28 % within the band."""
     case = case_of(223)
@@ -109,6 +112,7 @@ async def test_a_copied_torque_gives_an_ordinary_path_on_a_drive() -> None:
     assert all(tally.held["mode"])
 
 
+@pytest.mark.long
 async def test_a_late_mean_of_the_speed_is_not_used_on_a_drive() -> None:
     """The band held 40 % of the magnitudes where 606Ch is 1 ms old and a mean over 1.6 ms."""
     case = case_of(301)

@@ -70,6 +70,7 @@ def test_a_drive_of_another_maker_is_refused() -> None:
         master.start()
 
 
+@pytest.mark.long
 def test_the_segment_comes_up_over_a_real_wire(tmp_path: Path) -> None:
     why = unavailable()
     if why is not None:

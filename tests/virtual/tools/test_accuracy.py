@@ -21,6 +21,7 @@ TWO = mechanics((1e-4, 20.0, 0.002), (5e-5, 100.0, 0.005))
 ONE = mechanics((1e-4, 60.0, 0.006))
 
 
+@pytest.mark.long
 async def test_mechanics_without_a_loop_at_1_khz(namespace: Namespace) -> None:
     kept: list[tuple] = []
     async with bench(namespace, TWO) as b:
@@ -60,6 +61,7 @@ async def test_mechanics_beside_the_speed_loop_at_4_khz(namespace: Namespace) ->
         assert near.phase_deg < 3.0
 
 
+@pytest.mark.long
 async def test_autotune_keeps_its_promise_and_can_be_undone(namespace: Namespace) -> None:
     async with bench(namespace, ONE, 5e-4) as b:
         before = await b.values()

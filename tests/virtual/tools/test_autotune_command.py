@@ -106,6 +106,7 @@ def test_a_kept_design_is_verified_and_in_force(
     assert alone.state is not State.OPERATION_ENABLED
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
     monkeypatch: pytest.MonkeyPatch, number: signal.Signals
@@ -185,6 +186,7 @@ def answer(
 TRIED = wire_messages([text("autotune.candidate", bandwidth_hz=300.0, why=prose("too fast"))])
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("keep", [False, True])
 def test_by_a_server_a_design_is_taken_back_or_kept(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, keep: bool

@@ -107,6 +107,7 @@ async def test_after_gains_that_took_all_the_torque(monkeypatch: pytest.MonkeyPa
         assert away.begun_rev[1] == pytest.approx(away.begun_rev[0], abs=0.05)
 
 
+@pytest.mark.long
 async def test_notches_of_a_free_axis_that_becomes_too_fast_are_learned_with_less() -> None:
     async with direct(SWINGING, drive="r6l") as b:
         found = await sweep(b.axis, b.session, SweepSettings(WIDE, realisations=1), silent())

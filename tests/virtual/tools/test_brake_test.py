@@ -37,6 +37,7 @@ from tests.virtual.tools.set_ups.brake import (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "asked", "settings"), [("m6l", ASKED, M6L), ("r6l", CUT, {}), ("ep3e", CUT, {})]
 )
@@ -58,6 +59,7 @@ async def test_a_good_brake_holds_and_its_windup_is_no_slip(
         assert way.travel_rev <= 0.02
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("drive", "asked", "settings"), [("m6l", ASKED, M6L), ("r6l", CUT, {}), ("ep3e", CUT, {})]
 )
@@ -160,6 +162,7 @@ async def test_a_supported_load_of_a_vertical_axis_adds_to_the_torque() -> None:
     assert down.torque_percent == pytest.approx(100 * (0.4 + COULOMB_NM / RATED_NM), rel=0.07)
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(
     ("drive", "asked", "settings", "obstacle"),
     [

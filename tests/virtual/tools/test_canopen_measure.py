@@ -153,6 +153,7 @@ async def test_stop_writes_the_only_word_that_the_manual_prints(ds_c: CanBench) 
     assert await ds_c.axis.drive.raw("6040:00") == 11  # 003:296
 
 
+@pytest.mark.long
 async def test_mechanics_of_ds_c_by_its_profile_velocity(ds_c: CanBench) -> None:
     """Aims of a loop at 1 kHz: 0.4 dB and 3° to 200 Hz, resonances within 1 %."""
     settings = SweepSettings(WIDE, realisations=3, rated_torque_nm=1.27)
@@ -185,6 +186,7 @@ async def test_inertia_of_ds_c_despite_its_coarse_encoder(ds_c: CanBench) -> Non
     assert outcome.result.coulomb_nm.value == pytest.approx(0.03, rel=0.1)
 
 
+@pytest.mark.long
 async def test_inertia_of_a_load_that_the_loop_was_never_tuned_for() -> None:
     """60 times the motor, on a loop that swings at 2.3 Hz: the first moves are weak enough."""
     from backend.tools.inertia.run import InertiaSettings
@@ -200,6 +202,7 @@ async def test_inertia_of_a_load_that_the_loop_was_never_tuned_for() -> None:
     assert outcome.result.coulomb_nm.value == pytest.approx(0.06, rel=0.1)
 
 
+@pytest.mark.long
 async def test_any_drive_with_cyclic_modes_is_measured_over_sync() -> None:
     """CST over SYNC at 1 kHz: 0.3 dB and 2° to 250 Hz, and what went out comes back in the rows."""
     async with can_bench(ONE_RESONANCE, drive="generic402", pace=20.0) as bench:

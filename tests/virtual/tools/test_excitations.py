@@ -19,6 +19,7 @@ from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
 ONE = mechanics((1e-4, 60.0, 0.006))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("waveform", "loop", "drive"),
     [("chirp", "none", "mms7"), ("prbs", "none", "mms7"), ("stepped", "auto", "r6l")],
@@ -45,6 +46,7 @@ async def test_mechanics(waveform: Waveform, loop: Loop, drive: str) -> None:
     assert recompute(unpack(file)) == answer_of(found).model_dump(mode="json")
 
 
+@pytest.mark.long
 async def test_a_loop_from_its_reference() -> None:
     widths = []
     async with direct(ONE) as b:

@@ -34,6 +34,7 @@ LIMITED = mechanics((1e-4, 200.0, 0.005), travel=(-1.2, 0.8))
 HEAVY = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("drive", "spec", "khz"),
     [
@@ -55,6 +56,7 @@ async def test_mechanics_of_every_family(drive: str, spec: MechanicsSpec, khz: f
     assert near.covered >= 0.9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("loop", ["speed", "position"])
 async def test_mechanics_beside_a_closed_loop(loop: str) -> None:
     async with direct(ONE) as b:
@@ -65,6 +67,7 @@ async def test_mechanics_beside_a_closed_loop(loop: str) -> None:
     assert near.covered >= 0.9
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("drive", "spec", "limit"),
     [("mms7", SOFT, 0.02), ("mms7", HEAVY, 0.05), ("m6l", ONE, 0.02), ("r6l", ONE, 0.02)],
@@ -77,6 +80,7 @@ async def test_inertia_of_every_family(drive: str, spec: MechanicsSpec, limit: f
     assert found.coulomb_nm.value == pytest.approx(spec.friction.coulomb_nm, rel=0.1)
 
 
+@pytest.mark.long
 async def test_inertia_between_ends_that_are_found() -> None:
     async with direct(LIMITED) as b:
         before = await _raws(b)
@@ -91,6 +95,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
         assert abs(units.position(await b.axis.position_raw())) < 0.05
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not report its motor's inertia, which its inertia ratio counts in.
@@ -148,6 +153,7 @@ def _limits(b: DirectBench) -> list[str]:
     return [key for role in roles if (key := b.axis.drive.key(role)) is not None]
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("drive", "place"),
     [

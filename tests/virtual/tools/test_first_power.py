@@ -61,6 +61,7 @@ async def on(
         return found, bench
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("drive", FAMILIES)
 async def test_a_motor_that_is_connected_right(drive: str) -> None:
     found, _ = await on(drive, motor())
@@ -72,6 +73,7 @@ async def test_a_motor_that_is_connected_right(drive: str) -> None:
     assert found.covers_pole_pairs == 3
 
 
+@pytest.mark.long
 async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
     found, _ = await on("mms7", planted(motor(), "phases_shifted"))
     assert finding(found, "phases") == ("failed", "reversed")
@@ -82,6 +84,7 @@ async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
     assert "Turn the shaft by hand to learn which it is" in words
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
 async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
     found, _ = await on(drive, planted(motor(), "phases_exchanged"), at_rev=at_rev)
@@ -91,6 +94,7 @@ async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> Non
     assert "Exchange two phases or invert the feedback, and repeat" in words
 
 
+@pytest.mark.long
 async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() -> None:
     # cos(2pθ) is zero at θ = 1/(8p).
     found, _ = await on("r6l", motor(PhaseSpec(order="exchanged")), at_rev=1.0 / 32)
@@ -98,16 +102,19 @@ async def test_where_exchanged_phases_make_no_torque_the_next_step_is_named() ->
     assert found.verdict != "passed"
 
 
+@pytest.mark.long
 async def test_an_inverted_encoder_that_commutates_locks_too() -> None:
     found, _ = await on("m6l", planted(motor(), "feedback_inverted"))
     assert finding(found, "phases") == ("failed", "locks")
 
 
+@pytest.mark.long
 async def test_a_wrong_angle_beyond_a_quarter_turn_reverses_the_torque() -> None:
     found, _ = await on("ep3e", motor(PhaseSpec(angle_deg=180.0)))
     assert finding(found, "phases") == ("failed", "reversed")
 
 
+@pytest.mark.long
 async def test_a_hand_turn_tells_an_inverted_encoder_from_shifted_phases() -> None:
     hall = PhaseSpec(commutation="hall")
     found, _ = await by_hand(planted(motor(hall), "feedback_inverted"), 1.0, HAND)
@@ -122,6 +129,7 @@ async def test_a_hand_turn_tells_an_inverted_encoder_from_shifted_phases() -> No
     assert finding(found, "phases") == ("failed", "phases_reversed")
 
 
+@pytest.mark.long
 async def test_an_axis_that_only_counts_the_other_way_has_right_phases() -> None:
     # Phases exchanged and encoder inverted: both signs together are right again.
     found, _ = await by_hand(motor(PhaseSpec(order="exchanged"), inverted=True), 1.0, HAND)
@@ -138,6 +146,7 @@ async def test_wrong_counts_are_found_before_anything_is_energised(share: float)
     assert shaft_rev(bench) == 1.0
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("drive", "coulomb_nm", "found_as"),
     [
@@ -171,6 +180,7 @@ async def test_a_shaft_that_was_moved_out_of_the_travel_is_moved_back() -> None:
         assert found.pulses[-1].to_rev < 0.1
 
 
+@pytest.mark.long
 async def test_a_closed_brake_moves_nothing() -> None:
     found, _ = await on("r6l", planted(motor(), "brake_closed"))
     assert finding(found, "brake") == ("open", "not_seen")

@@ -62,6 +62,7 @@ def _job(result: object) -> str:
     })  # fmt: skip
 
 
+@pytest.mark.long
 async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     async with direct(mechanics((1e-4, 60.0, 0.006)), 5e-4) as b:
         found = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())

@@ -40,6 +40,7 @@ def codes(found: FrictionResult) -> set[str]:
     return {each.code for each in found.findings}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "ep3e", "ds_c"])
 async def test_the_curve_of_every_family(drive: str) -> None:
     async with under(drive, RIPPLED) as (axis, session):
@@ -75,6 +76,7 @@ async def test_the_curve_of_every_family(drive: str) -> None:
     assert found.load_percent.value == pytest.approx(0.0, abs=0.1)
 
 
+@pytest.mark.long
 async def test_gravity_is_a_constant_pull_and_no_friction() -> None:
     # Friction holds it without power, as a steep screw does: a drive without a brake lets go.
     hanging = FRICTION.model_copy(update={"gravity_nm": 0.03})
@@ -109,6 +111,7 @@ async def test_friction_without_stribeck_and_ripple_has_none() -> None:
     assert found.viscous_percent_per_rpm.value == pytest.approx(expected, rel=0.05)
 
 
+@pytest.mark.long
 async def test_short_travel_is_gone_to_and_fro_and_says_no_ripple() -> None:
     asked = ASKED.model_copy(update={"travel_limit": 0.3, "speeds": 5})
     async with direct(SMOOTH) as b:
@@ -148,6 +151,7 @@ async def test_limits_that_leave_nothing_are_refused_before_the_map() -> None:
             await mapped(b.axis, b.session, asked)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ending", ["cancelled", "fault"])
 async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
     async with direct(SMOOTH) as b:
@@ -170,6 +174,7 @@ async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
         assert await b.axis.state() is not State.OPERATION_ENABLED
 
 
+@pytest.mark.long
 async def test_kept_raw_data_give_the_same_map_and_lost_samples_do_not_bend_it() -> None:
     """A busy computer loses samples in runs; the ripple in such a gap is not a straight line."""
     kept: dict[str, object] = {}
@@ -228,6 +233,7 @@ async def _kept(b: DirectBench, kept: dict[str, object]) -> FrictionResult:
     return found
 
 
+@pytest.mark.long
 async def test_over_ethercat_frames(namespace: Namespace) -> None:
     async with bench(namespace, RIPPLED, drive="r6l") as b:
         found = await mapped(b.axis, b.session, ASKED.model_copy(update={"speeds": 5}))

@@ -44,6 +44,7 @@ def between(found: Any, truth: float) -> bool:
     return bool(low <= truth <= high)
 
 
+@pytest.mark.long
 async def test_two_axes_without_a_beam_are_no_gantry(namespace: Namespace) -> None:
     async with gantry(namespace, joined=False) as two:
         found = await measured(two, ASKED.model_copy(update={"resolution_hz": 10.0}))
@@ -61,6 +62,7 @@ async def test_two_axes_without_a_beam_are_no_gantry(namespace: Namespace) -> No
     )
 
 
+@pytest.mark.long
 async def test_a_square_gantry(namespace: Namespace) -> None:
     kept: list[tuple[Any, Any]] = []
 
@@ -116,6 +118,7 @@ async def test_a_square_gantry(namespace: Namespace) -> None:
     assert again.model_dump(mode="json") == found.model_dump(mode="json")
 
 
+@pytest.mark.long
 async def test_a_gantry_out_of_square_is_named_with_its_way(namespace: Namespace) -> None:
     """Brakes hold the beam where both motors show the same, which is not where it rests."""
     spec = SQUARE.model_copy(update={"square_error_rad": OUT_OF_SQUARE_RAD})

@@ -23,6 +23,7 @@ from tests.virtual.tools.set_ups.health import (
 )
 
 
+@pytest.mark.long
 @pytest.mark.timeout(300)
 async def test_a_loose_coupling_and_a_worn_belt_are_found(tmp_path: Path) -> None:
     healthy = await checked(axis_of(), 3)

@@ -81,6 +81,7 @@ def axis(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Axis:
     return made
 
 
+@pytest.mark.long
 def test_from_a_measurement_to_a_change(axis: Axis, tmp_path: Path) -> None:
     out = run("measure", *AT, "--rounds", "3", "--speed-rpm", "800", "--consent")
     assert "3 rounds were measured" in out

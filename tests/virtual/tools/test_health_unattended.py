@@ -236,6 +236,7 @@ async def nobody(station: Station) -> None:
     station.people.accounts_needed = True
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize(
     ("way", "code"),
     [

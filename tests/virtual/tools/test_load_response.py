@@ -46,6 +46,7 @@ async def swept(spec: MechanicsSpec, keep: Any = None, asked: SweepRequest = ASK
         return await TOOL.run(Run(bench.axis, bench.session, silent(), keep), asked)
 
 
+@pytest.mark.long
 async def test_the_response_of_the_load_is_that_of_the_mechanics() -> None:
     kept: dict[str, Any] = {}
 
@@ -79,6 +80,7 @@ async def test_the_response_of_the_load_is_that_of_the_mechanics() -> None:
     assert TOOL.reevaluate(old, kept["meta"]).load is None
 
 
+@pytest.mark.long
 async def test_an_encoder_that_does_not_follow_is_said_and_not_shown() -> None:
     spec = axis(gap=0.0, counts_per_rev=16)
     loose = {"stiffness_nm_per_rad": 1e-6, "damping_nms_per_rad": 0.0}
@@ -91,6 +93,7 @@ async def test_an_encoder_that_does_not_follow_is_said_and_not_shown() -> None:
     assert "sweep.load-does-not-follow" in codes
 
 
+@pytest.mark.long
 async def test_without_a_second_encoder_nothing_is_said_of_the_load() -> None:
     found = await swept(axis(gap=0.0).model_copy(update={"load_encoder": None}))
     assert found.load is None

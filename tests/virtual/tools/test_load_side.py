@@ -36,6 +36,7 @@ def codes(found: LoadSideResult) -> list[str]:
     return [each.code for each in found.findings]
 
 
+@pytest.mark.long
 async def test_backlash_stiffness_and_error_are_those_of_the_mechanics() -> None:
     kept: dict[str, Any] = {}
 
@@ -74,6 +75,7 @@ async def test_backlash_stiffness_and_error_are_those_of_the_mechanics() -> None
     assert again.model_dump(mode="json") == found.model_dump(mode="json")
 
 
+@pytest.mark.long
 async def test_the_backlash_of_a_worn_belt_is_found_with_the_next_step() -> None:
     """As the demo plants it, on an axis that has no backlash otherwise."""
     healthy = axis(gap=0.0)
@@ -92,6 +94,7 @@ async def test_the_backlash_of_a_worn_belt_is_found_with_the_next_step() -> None
     assert "belt tension" in words
 
 
+@pytest.mark.long
 async def test_an_encoder_behind_a_gear_that_counts_backwards() -> None:
     spec = axis(gap=0.01, gear=2.0, inverted=True, offset_counts=2**31 - 5000)
     asked = ASKED.model_copy(update={"gear_ratio": 2.0, "motor_inertia_kgm2": None})
@@ -124,6 +127,7 @@ async def test_a_drive_without_a_second_position_is_refused_before_anything_move
             assert touched == []
 
 
+@pytest.mark.long
 async def test_a_load_that_came_off_is_named() -> None:
     spec = axis(gap=0.0, counts_per_rev=16)
     loose = spec.model_copy(

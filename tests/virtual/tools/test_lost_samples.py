@@ -99,6 +99,7 @@ class Late:
         return 2 if self._cycles == 900 and len(self.long) in self._numbers else 0
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("loop", ["none", "speed"])
 async def test_a_realisation_that_lost_samples_is_played_again(
     loop: Loop, monkeypatch: pytest.MonkeyPatch
@@ -118,6 +119,7 @@ async def test_a_realisation_that_lost_samples_is_played_again(
         assert np.all(recording.valid[: sequence.excitation.samples.size - 50])
 
 
+@pytest.mark.long
 async def test_a_bus_that_loses_samples_all_the_time_ends_in_bounded_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -134,6 +136,7 @@ async def test_a_bus_that_loses_samples_all_the_time_ends_in_bounded_time(
         assert np.all(last), "one period is whole"
 
 
+@pytest.mark.long
 async def test_what_is_played_again_is_shared_where_a_period_is_whole_already(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -147,6 +150,7 @@ async def test_what_is_played_again_is_shared_where_a_period_is_whole_already(
     assert "measuring, realisation 2 of 2: repeated, because samples were lost" in steps
 
 
+@pytest.mark.long
 async def test_what_was_before_a_motion_is_no_part_of_it_however_late_it_comes() -> None:
     """A server that stood still finds the samples of before when the motion has begun."""
     async with direct(ONE) as b:

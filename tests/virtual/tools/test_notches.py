@@ -68,6 +68,7 @@ def test_too_near_to_an_end_nothing_trembles() -> None:
     assert notch_effect.room_to_tremble(WIDE, 0.0, None) is not None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "still"),
     [("mms7", False), ("m6l", False), ("m6l", True), ("r6l", False)],

@@ -86,6 +86,7 @@ midways = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.long(keep=2)
 @midways
 @pytest.mark.parametrize("trouble", ["cancelled", "faulted"])
 async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble: str) -> None:
@@ -109,6 +110,7 @@ async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble
         assert not b.axis.stop_pending
 
 
+@pytest.mark.long(keep=2)
 @midways
 async def test_what_a_lost_drive_is_pending_comes_back_by_itself(
     drive: str, tool: str, step: str

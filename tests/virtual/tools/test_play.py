@@ -28,6 +28,7 @@ async def test_play_is_named_and_its_model_withheld() -> None:
     assert errors(found.frf, LOOSE, 5, 250).covered >= 0.9
 
 
+@pytest.mark.long
 async def test_odd_lines_tell_odd_from_even_distortion_and_measure_as_well() -> None:
     """Coulomb friction and play are odd. The limits are those of tuning.md at 1 kHz."""
     spec = mechanics((1e-4, 20.0, 0.002))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from backend.tools.autotune.candidates import plan
 from backend.tools.autotune.present import KEPT
 from backend.tools.measuring.temporary import put_back, write_settings
@@ -20,6 +22,7 @@ from tests.virtual.tools.test_wrong_situations import (
 )
 
 
+@pytest.mark.long
 async def test_gains_that_are_sound_and_faster_than_every_design_stay() -> None:
     found = await found_of(MMS7)
     best = next(c for c in found.candidates if "balanced" in c.marks)

@@ -76,6 +76,7 @@ async def largest_command(b: Any, settings: GeneratorSettings) -> int:
     return max(sent)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
 async def test_60_rpm_is_sent_as_60_to_a_drive_that_counts_rpm(bus: str) -> None:
     """60A9h = 00B44700h. In increments per second it would be 10 000 and more."""
@@ -86,6 +87,7 @@ async def test_60_rpm_is_sent_as_60_to_a_drive_that_counts_rpm(bus: str) -> None
         assert await largest_command(b, SPIN) == 60
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
 async def test_a_tenth_of_an_rpm_is_sent_as_it_is_stated(bus: str) -> None:
     async with bench(bus, rough(velocity_unit=TENTH_RPM_CODE)) as b:
@@ -115,6 +117,7 @@ async def test_a_606c_that_contradicts_the_position_ends_the_motion(
         assert "rpm, the position gives" in ended.value.message
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
 @pytest.mark.parametrize(
     "options",
@@ -246,6 +249,7 @@ async def test_608f_alone_gives_the_resolution() -> None:
         assert b.link.device.axis.angle_rad == pytest.approx(before, abs=0.05)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
 async def test_a_small_move_teaches_resolution_and_unit(bus: str) -> None:
     """A drive in 0.1 rpm that says nothing of it, 10 000 increments to the revolution."""
@@ -292,6 +296,7 @@ async def test_a_small_move_of_a_blocked_axis_teaches_nothing() -> None:
         assert b.link.highest["torque"] <= 150 + 5
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("opens_s", [0.0, 0.3])
 async def test_a_brake_that_opens_late_is_waited_for(opens_s: float) -> None:
     """It grips with twice the rated torque for 300 ms of Operation enabled; no bit reports it."""

@@ -100,6 +100,7 @@ class Played(Exception):
     """The first setpoints of a tool went out."""
 
 
+@pytest.mark.long(keep=7)
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in REFUSED_ANYWAY])
 async def test_another_clients_feed_constant_is_that_of_the_next_motion(kind: str) -> None:
     """10 000 increments to the revolution when the drive was connected, 1 000 at the motion."""

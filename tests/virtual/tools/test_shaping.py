@@ -35,6 +35,7 @@ from tests.virtual.tools.set_ups.shaping import (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "frequency_hz", "acceleration_rpm_s"),
     [

@@ -20,6 +20,7 @@ async def known_of(drive: str, spec: MechanicsSpec, *, vertical: bool) -> Known:
     return _KNOWN[drive, vertical]
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("kind", ["control power", "main power"])
 @pytest.mark.parametrize(
     ("drive", "part", "number"),
@@ -34,6 +35,7 @@ async def test_a_supply_that_fails(drive: str, part: str, number: int, kind: str
     assert await struck(drive, axis_of(vertical=False), part, number, kind)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "vertical", "number", "kind"),
     [
@@ -54,6 +56,7 @@ async def test_trouble_while_notches_are_learned(
     assert await struck(drive, spec, "notches", number, kind, known)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["cable", "cancelled"])
 @pytest.mark.parametrize("number", [5, 7])
 async def test_later_realisations(number: int, kind: str) -> None:

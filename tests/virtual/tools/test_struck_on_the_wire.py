@@ -86,6 +86,7 @@ async def settled(b: Bench | CanBench, before: dict[str, object]) -> bool:
         return False
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "part", "step", "fraction", "kind"),
     [
@@ -114,6 +115,7 @@ async def test_over_ethercat(
         await struck(b, lambda p: work(b, part, known, p), step, fraction, strike, mend)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("part", "step"), [("inertia", "reciprocating move"), ("sweep", "realisation 2 of 2")]
 )

@@ -39,6 +39,7 @@ async def as_before(b: Bench, before: dict[str, object]) -> None:
     assert after == before, {k: (before[k], after[k]) for k in before if before[k] != after[k]}
 
 
+@pytest.mark.long
 async def test_cancelled(namespace: Namespace) -> None:
     async with bench(namespace, ONE, settings={"2008:01": 1, "2008:02": 12768 + 20000,
                                                "2008:03": 42768, "2008:04": 12800,
@@ -55,6 +56,7 @@ async def test_cancelled(namespace: Namespace) -> None:
         await as_before(b, before)
 
 
+@pytest.mark.long
 async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
     async with bench(namespace, ONE) as b:
         before = await b.values()
@@ -67,6 +69,7 @@ async def test_a_fault_in_the_middle(namespace: Namespace) -> None:
         await as_before(b, before)
 
 
+@pytest.mark.long
 async def test_the_cable_is_pulled_and_put_back(namespace: Namespace) -> None:
     """What the drive is pending, its mode above all, comes back over the healed segment."""
     async with bench(namespace, ONE) as b:
@@ -103,6 +106,7 @@ async def settled(b: Bench, before: dict[str, object]) -> bool:
         return False
 
 
+@pytest.mark.long
 async def test_a_load_that_pulls_is_measured_only_under_a_loop(namespace: Namespace) -> None:
     spec = mechanics((1e-4, 200.0, 0.005), gravity=0.15)
     # The holding brake of the drive keeps the load while it is disabled (2108h:01).

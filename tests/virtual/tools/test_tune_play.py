@@ -45,6 +45,7 @@ async def applied_loose(b: DirectBench, progress: Progress, keep: Any = None) ->
     return await apply_and_verify(b.axis, b.session, settings, facts, found, progress, keep)
 
 
+@pytest.mark.long
 async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> None:
     await found_tight()
     played: list[set[int]] = []
@@ -90,6 +91,7 @@ async def test_what_the_loop_shows_is_predicted_and_verified_by_other_data() -> 
     assert len(reported.closed_db or ()) == len(reported.frequency_hz or ()) > 0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("step", ["4 of 6: design for", "6 of 6: measuring"])
 async def test_cancelled_in_the_second_look_everything_is_as_before(step: str) -> None:
     await found_tight()

@@ -66,6 +66,7 @@ class Kept:
         self.arrays, self.meta = arrays, meta
 
 
+@pytest.mark.long
 async def test_orders_and_the_mode_that_they_excite() -> None:
     spec = CHAIN.model_copy(update={"ripple": RIPPLE, "place": PLACE})
     kept = Kept()
@@ -93,6 +94,7 @@ async def test_orders_and_the_mode_that_they_excite() -> None:
     assert VIBRATION.reevaluate(kept.arrays, kept.meta) == found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["m6l"])
 async def test_an_axis_without_ripple_has_no_order_and_no_resonance(drive: str) -> None:
     brief = MAP.model_copy(update={"closer": 0, "slowest_rpm": 300.0})
@@ -110,6 +112,7 @@ async def test_limits_without_room_or_time_are_refused() -> None:
             await asked(bench, VIBRATION, MAP.model_copy(update={"slowest_rpm": 790.0}))
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("drive", ["r6l", "mms7"])
 async def test_a_dwell_shows_the_impedance_of_the_chain(drive: str) -> None:
     kept = Kept()
@@ -165,6 +168,7 @@ async def test_a_dwell_beyond_the_envelope_is_refused(changed: dict[str, Any], w
         assert await bench.axis.position_raw() == home
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ending", ["cancelled", "fault", "envelope"])
 async def test_a_dwell_ends_and_everything_is_as_before(ending: str) -> None:
     settings = VIBRATE.model_copy(update={"duration_s": 20.0})

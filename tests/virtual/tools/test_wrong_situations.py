@@ -101,6 +101,7 @@ async def unharmed(
         assert after == before, {k: (before[k], after[k]) for k in before if before[k] != after[k]}
 
 
+@pytest.mark.long(keep=1)
 @families
 async def test_a_wrong_sign_is_reported(family: Family) -> None:
     async with unharmed(ONE, family, settings={"607E:00": family.polarity}) as b:
@@ -110,6 +111,7 @@ async def test_a_wrong_sign_is_reported(family: Family) -> None:
             await autotune(b.axis, b.session, family.autotune(), silent())
 
 
+@pytest.mark.long
 @families
 async def test_a_torque_limit_of_the_drive_is_kept(family: Family) -> None:
     # The drive gives a third of the rated torque, whatever the envelope permits.
@@ -120,6 +122,7 @@ async def test_a_torque_limit_of_the_drive_is_kept(family: Family) -> None:
         assert near.magnitude_db < 0.3
 
 
+@pytest.mark.long
 @families
 async def test_a_torque_that_the_drive_cuts_is_reported(
     family: Family, monkeypatch: pytest.MonkeyPatch
@@ -134,6 +137,7 @@ async def test_a_torque_that_the_drive_cuts_is_reported(
             await autotune(b.axis, b.session, family.autotune(), silent())
 
 
+@pytest.mark.long(keep=1)
 @families
 async def test_start_gains_that_oscillate(family: Family) -> None:
     soft = mechanics((1e-4, 60.0, 0.0005))
@@ -152,6 +156,7 @@ async def test_start_gains_that_oscillate(family: Family) -> None:
         assert units.velocity(b.link.highest["speed"]) < WIDE.speed_rpm
 
 
+@pytest.mark.long
 @families
 async def test_too_little_travel_for_every_tool(family: Family) -> None:
     tight = Envelope(0.02, 600.0, 60.0, 30.0)
@@ -168,6 +173,7 @@ async def test_too_little_travel_for_every_tool(family: Family) -> None:
         assert abs(units.position(await b.axis.position_raw() - start)) < 0.2
 
 
+@pytest.mark.long(keep=1)
 @families
 async def test_a_blocked_axis(family: Family) -> None:
     async with unharmed(mechanics(coulomb=0.9), family) as b:
@@ -182,6 +188,7 @@ async def test_a_blocked_axis(family: Family) -> None:
                 await work
 
 
+@pytest.mark.long(keep=1)
 @families
 async def test_a_first_move_grows_within_the_envelope(family: Family) -> None:
     """A blocked axis: what is tried grows no further than the envelope, and the words fit it."""
@@ -204,6 +211,7 @@ async def test_a_first_move_grows_within_the_envelope(family: Family) -> None:
         assert abs(units.position(await b.axis.position_raw() - begun)) < 0.05
 
 
+@pytest.mark.long
 @families
 async def test_a_closed_brake_is_distinguished_from_an_axis(family: Family) -> None:
     async with unharmed(ONE, family) as b:
@@ -231,6 +239,7 @@ async def test_an_envelope_that_is_hit_ends_the_measurement(family: Family) -> N
             await autotune(b.axis, b.session, family.autotune(narrow), silent())
 
 
+@pytest.mark.long(keep=1)
 @families
 @pytest.mark.parametrize("tool", ["sweep", "autotune"])
 async def test_a_drive_that_faults_while_it_is_measured(family: Family, tool: str) -> None:
@@ -269,6 +278,7 @@ async def apply(b: DirectBench, family: Family, progress: Progress) -> AutotuneR
     return await apply_and_verify(b.axis, b.session, settings, facts, found, progress, None)
 
 
+@pytest.mark.long
 @families
 async def test_a_drive_that_faults_while_the_tuned_loop_is_verified(family: Family) -> None:
     await found_of(family)
@@ -279,6 +289,7 @@ async def test_a_drive_that_faults_while_the_tuned_loop_is_verified(family: Fami
         assert at.done
 
 
+@pytest.mark.long(keep=1)
 @families
 @pytest.mark.parametrize(
     ("tool", "step"),
@@ -330,6 +341,7 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         assert not b.axis.drive.pending_restores
 
 
+@pytest.mark.long(keep=1)
 @families
 @pytest.mark.parametrize("step", ["1 of 6", "2 of 6", "3 of 6"])
 async def test_autotune_is_cancelled_while_it_measures(family: Family, step: str) -> None:
@@ -341,6 +353,7 @@ async def test_autotune_is_cancelled_while_it_measures(family: Family, step: str
             await task
 
 
+@pytest.mark.long
 async def test_autotune_is_cancelled_while_it_designs() -> None:
     async with unharmed(ONE) as b:
         at = At("4 of 6", lambda: task.cancel())  # noqa: PLW0108
@@ -349,6 +362,7 @@ async def test_autotune_is_cancelled_while_it_designs() -> None:
             await task
 
 
+@pytest.mark.long(keep=2)
 @families
 @pytest.mark.parametrize(
     ("step", "fraction"),
@@ -372,6 +386,7 @@ async def test_autotune_is_cancelled_after_it_has_written(
             await task
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("tool", ["sweep", "inertia", "step"])
 @pytest.mark.parametrize(
     ("family", "fraction"),

@@ -23,6 +23,7 @@ CHOSEN = (
 )  # fmt: skip
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("case", [pytest.param(c, id=c.name) for c in CASES if c.name in CHOSEN])
 async def test_the_injected_cause_comes_first(case: CanCase) -> None:
     assert (await causes_of(case))[:1] == [case.cause]

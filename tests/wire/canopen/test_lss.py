@@ -145,6 +145,7 @@ async def test_a_bit_rate_counts_after_a_power_cycle(bench: Bench, link: Canopen
         await link.lss.set_bit_rate(truth(bench.node), 300, store=True)
 
 
+@pytest.mark.long
 async def test_of_several_without_number_each_is_found_in_turn(
     bench: Bench, link: CanopenLink
 ) -> None:
@@ -181,6 +182,7 @@ def test_an_answer_that_comes_late_does_not_lose_the_node() -> None:
     assert found == slave.identity
 
 
+@pytest.mark.long
 def test_an_independent_master_finds_and_names_the_virtual_node(bench: Bench) -> None:
     """python-canopen's own LSS master."""
     network = canopen.Network()
@@ -201,6 +203,7 @@ def test_an_independent_master_finds_and_names_the_virtual_node(bench: Bench) ->
         network.disconnect()
 
 
+@pytest.mark.long
 def test_the_command_line_finds_names_and_sets(bench: Bench) -> None:
     run = CliRunner().invoke
     found = run(cli.app, ["lss", "search", bench.url, "--json"])

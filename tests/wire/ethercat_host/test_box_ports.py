@@ -83,6 +83,7 @@ def asked(network: Namespace, port: int, *said: str) -> dict[str, Any]:
     return answer
 
 
+@pytest.mark.long
 def test_from_the_first_start_to_the_first_drive(network: Namespace, tmp_path: Path) -> None:
     state = tmp_path / "state"
     with started(network, state) as (port, printed):

@@ -69,6 +69,7 @@ async def in_safe_op(link: EthercatLink) -> None:
     await link.al_states.request(1, 8)
 
 
+@pytest.mark.long
 async def test_a_drive_and_a_sloppy_slave(namespace: Namespace) -> None:
     """Through the host process: the drive is left in Pre-Op, without an error, and disabled."""
     async with opened(namespace) as (link, segment):

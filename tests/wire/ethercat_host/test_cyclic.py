@@ -117,6 +117,7 @@ class Track:
         return np.concatenate([block.samples[:, column] for block in self.blocks])
 
 
+@pytest.mark.long
 async def test_a_trajectory_is_played_exactly_one_value_per_cycle(rig: Rig) -> None:
     async with running(rig) as bus:
         track = Track(bus)
@@ -147,11 +148,13 @@ async def test_a_trajectory_is_played_exactly_one_value_per_cycle(rig: Rig) -> N
                 assert block.t0_s == pytest.approx(end, abs=1e-3), "no gap that is not counted"
 
 
+@pytest.mark.long
 async def test_mapped_objects_keep_the_value_that_they_had(rig: Rig) -> None:
     async with running(rig):
         assert rig.truth(0, 0x6072) == 3000, "a mapped torque limit must not become zero"
 
 
+@pytest.mark.long
 async def test_parameters_are_read_while_axes_move(rig: Rig) -> None:
     async with running(rig) as bus:
         await enable(bus, 1)
@@ -182,6 +185,7 @@ async def test_velocity_and_torque_modes(rig: Rig) -> None:
         await until(lambda: rig.truth(0, 0x606C) == 0, HANG_S, "the quick stop ends the motion")
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("what", "envelope", "halt", "words"),
     [
@@ -220,6 +224,7 @@ async def test_the_envelope_stops_one_axis_and_not_the_other(
         assert not [t for t in bus.texts if "beyond" in t and words not in t]
 
 
+@pytest.mark.long
 async def test_what_the_envelope_forbids_is_refused_before_anything_moves(rig: Rig) -> None:
     async with running(rig) as bus:
         here = rig.truth(0, 0x6064)
@@ -235,6 +240,7 @@ async def test_what_the_envelope_forbids_is_refused_before_anything_moves(rig: R
         assert rig.truth(0, 0x6064) == here
 
 
+@pytest.mark.long
 async def test_single_wrong_counters_and_lost_frames_are_tolerated_and_counted(rig: Rig) -> None:
     async with running(rig) as bus:
         await enable(bus, 1)
@@ -253,6 +259,7 @@ async def test_single_wrong_counters_and_lost_frames_are_tolerated_and_counted(r
         assert bus.link.quality().wkc_errors - before.wkc_errors == 1
 
 
+@pytest.mark.long
 async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
     async with running(rig) as bus:
         await enable(bus, 1)
@@ -264,6 +271,7 @@ async def test_data_that_stay_invalid_stop_the_axis(rig: Rig) -> None:
         await until(lambda: in_state(bus, 1) == "Ready to switch on", HANG_S)
 
 
+@pytest.mark.long
 async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled(
     rig: Rig,
 ) -> None:
@@ -279,6 +287,7 @@ async def test_a_power_cycle_in_motion_ends_it_and_the_drive_comes_back_disabled
         await bus.link.process_data.run([move(1, ramp(rig, 0, count=30))])
 
 
+@pytest.mark.long
 async def test_another_drive_after_a_break_is_refused_in_words(rig: Rig) -> None:
     async with running(rig) as bus:
         cyclic = bus.link.process_data
@@ -294,6 +303,7 @@ async def test_another_drive_after_a_break_is_refused_in_words(rig: Rig) -> None
         assert not cyclic.trouble, "nobody wants it any more"
 
 
+@pytest.mark.long
 async def test_watchdogs_are_in_the_slaves(rig: Rig) -> None:
     async with running(rig):
         for slave in (0, 1):
@@ -303,6 +313,7 @@ async def test_watchdogs_are_in_the_slaves(rig: Rig) -> None:
             assert int(str(rig.do("register", slave=slave, address=0x814, length=1))) & 0x40
 
 
+@pytest.mark.long
 async def test_a_refused_mapping_names_drive_and_reason(rig: Rig) -> None:
     async with rig.link() as bus:
         wish = [CyclicSignal(1, Address(0x2001, 1, "UINT16"), "odd")]

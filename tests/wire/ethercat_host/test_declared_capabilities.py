@@ -88,6 +88,7 @@ def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.long
 def test_the_station_scans_with_what_unit_and_container_declare(
     network: Namespace, tmp_path: Path
 ) -> None:
@@ -105,6 +106,7 @@ def test_the_station_scans_with_what_unit_and_container_declare(
     assert "station 1:" in found.stdout
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("missing", ["CAP_NET_RAW", "CAP_NET_ADMIN"])
 def test_without_one_that_is_needed_the_bus_is_refused_with_its_name(
     missing: str, network: Namespace, tmp_path: Path

@@ -22,6 +22,7 @@ def odd_rig(namespace: Namespace) -> Iterator[Rig]:
     rig.segment.close()
 
 
+@pytest.mark.long
 async def test_fixed_process_data_and_no_clock(odd_rig: Rig) -> None:
     async with odd_rig.link() as bus:
         link = bus.link
@@ -53,6 +54,7 @@ async def test_firmware_goes_in_with_progress(odd_rig: Rig) -> None:
         assert len(steps) > 10
 
 
+@pytest.mark.long
 async def test_an_emergency_before_mapping_does_not_spoil_it(odd_rig: Rig) -> None:
     async with odd_rig.link() as bus:
         bus.link.attach(1, servo_profile(remappable=False))

@@ -16,6 +16,7 @@ from tests.wire.ethercat_host.test_cyclic import running
 LOCKSTEP = True
 
 
+@pytest.mark.long
 async def test_mailbox_process_data_and_our_own_remarks(rig: Rig, tmp_path: Path) -> None:
     if shutil.which("tshark") is None:
         pytest.skip("tshark is not installed: .ci/run installs it")

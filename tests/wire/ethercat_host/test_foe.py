@@ -95,6 +95,7 @@ def calm(rig: Rig) -> Rig:
     return rig
 
 
+@pytest.mark.long
 async def test_the_file_is_loaded_in_boot_and_the_drive_comes_back(calm: Rig) -> None:
     async with calm.link() as bus:
         loading = Loading(bus)
@@ -107,6 +108,7 @@ async def test_the_file_is_loaded_in_boot_and_the_drive_comes_back(calm: Rig) ->
         await loading.works()
 
 
+@pytest.mark.long
 async def test_nothing_else_is_asked_of_a_drive_that_is_being_loaded(calm: Rig) -> None:
     calm.do("timing", slave=0, sdo_s=0.05)
     async with calm.link() as bus:

@@ -94,6 +94,7 @@ def mms7(namespace: Namespace, rig: Rig) -> Iterator[Rig]:
     rig.start()
 
 
+@pytest.mark.long
 async def test_jog_in_profile_position_and_stop_without_process_data(mms7: Rig) -> None:
     async with mms7.link() as bus:
         link = bus.link

@@ -131,6 +131,7 @@ async def test_a_refused_state_comes_with_the_reason(rig: Rig) -> None:
         assert await bus.link.read(1, STATUS) == b"\x50\x02", "the error was acknowledged"
 
 
+@pytest.mark.long
 async def test_slow_states_and_slow_answers_are_waited_for(rig: Rig) -> None:
     rig.do("timing", al_s=0.4, sdo_s=0.2)
     async with rig.link(scan=False) as bus:
@@ -138,6 +139,7 @@ async def test_slow_states_and_slow_answers_are_waited_for(rig: Rig) -> None:
         assert [f.state for f in found] == [prose("PREOP")] * 2
 
 
+@pytest.mark.long
 @repeated
 async def test_an_answer_that_comes_too_late_is_not_taken_for_another(rig: Rig) -> None:
     async with rig.link() as bus:
@@ -151,6 +153,7 @@ async def test_an_answer_that_comes_too_late_is_not_taken_for_another(rig: Rig) 
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 
+@pytest.mark.long
 async def test_a_mute_mailbox_times_out_and_comes_back(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("mute", slave=0)
@@ -163,6 +166,7 @@ async def test_a_mute_mailbox_times_out_and_comes_back(rig: Rig) -> None:
         assert await bus.link.read(1, RECORD[3]) == b"\x77\x66\x55\x44"
 
 
+@pytest.mark.long
 @repeated
 async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig) -> None:
     async with rig.link() as bus:
@@ -246,6 +250,7 @@ async def test_a_heap_of_late_frames_is_never_taken_for_answers(rig: Rig) -> Non
         await until(lambda: int(bus.link.quality().details["late_frames"]) > 0, 30.0)
 
 
+@pytest.mark.long
 async def test_a_busy_eeprom_ends_in_words(rig: Rig) -> None:
     rig.do("eeprom_busy", slave=0, for_s=1.0)
     async with rig.link(scan=False) as bus:
@@ -266,6 +271,7 @@ async def test_an_emergency_is_reported_once(rig: Rig) -> None:
         assert sum("0x8611" in t for t in bus.texts) == 1
 
 
+@pytest.mark.long
 @repeated
 async def test_the_alias_is_written_with_its_checksum(rig: Rig) -> None:
     async with rig.link() as bus:
@@ -315,6 +321,7 @@ async def test_a_hung_host_is_killed_and_replaced(rig: Rig) -> None:
         assert bus.link.quality().details["host_restarts"] == 1
 
 
+@pytest.mark.long
 async def test_a_killed_and_restarted_segment_is_found_again(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.segment.kill()
@@ -326,6 +333,7 @@ async def test_a_killed_and_restarted_segment_is_found_again(rig: Rig) -> None:
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 
+@pytest.mark.long
 async def test_no_descriptor_is_left_behind(rig: Rig) -> None:
     async with rig.link():
         pass

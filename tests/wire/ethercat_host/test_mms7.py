@@ -36,6 +36,7 @@ async def position(link: EthercatLink) -> int:
     return int.from_bytes(await link.read(1, ACTUAL), "little", signed=True)
 
 
+@pytest.mark.long
 async def test_mms7_is_read_whole_and_moves(namespace: Namespace, mms7: VirtualSegment) -> None:
     profile = load_profile("mms7")
     addresses = [

@@ -48,6 +48,7 @@ def set_for_good(rig: Rig) -> bool:
     return inside(rig, _LOOK, "ec0m") == "1"
 
 
+@pytest.mark.long
 async def test_closing_leaves_the_interface_as_it_was(rig: Rig) -> None:
     assert not set_for_good(rig)
     async with rig.link() as bus:

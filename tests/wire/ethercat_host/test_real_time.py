@@ -47,6 +47,7 @@ async def test_halt_stops_every_axis(rig: Rig) -> None:
             await until(lambda n=station: in_state(bus, n) == "Ready to switch on", 1.0)  # type: ignore[misc]
 
 
+@pytest.mark.long
 @repeated
 async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
     async with running(rig) as bus:
@@ -75,6 +76,7 @@ async def test_a_cable_cut_in_motion_stops_the_axis_and_heals(rig: Rig) -> None:
         await bus.link.process_data.run([move(2, ramp(rig, 1, count=30))])
 
 
+@pytest.mark.long
 @repeated
 async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(rig: Rig) -> None:
     async with running(rig) as bus:
@@ -105,6 +107,7 @@ async def test_killing_the_host_in_motion_stops_the_axis_and_recovers_disabled(r
         await bus.link.process_data.run([move(1, ramp(rig, 0, count=50))])
 
 
+@pytest.mark.long
 @repeated
 async def test_killing_the_server_in_motion_stops_the_axis(rig: Rig) -> None:
     """The host notices the end of the pipe, brakes, disables and leaves OP."""
@@ -148,6 +151,7 @@ async def test_killing_the_server_in_motion_stops_the_axis(rig: Rig) -> None:
         assert len(await bus.link.scan(lambda _s, _t: None)) == 2
 
 
+@pytest.mark.long
 @repeated
 async def test_killing_the_segment_in_motion_ends_it_and_a_new_one_is_taken_up(rig: Rig) -> None:
     async with running(rig) as bus:

@@ -255,6 +255,7 @@ async def test_on_a_real_wire_a_stop_does_not_wait_behind_reads(rig: Rig) -> Non
         await until(lambda: rig.do("read", slave=0, index=0x6040) == "0200", 30.0)
 
 
+@pytest.mark.long
 async def test_a_stop_does_not_wait_for_the_set_up_of_an_exchange(rig: Rig) -> None:
     """Nothing of ours moves meanwhile, but somebody else may turn the axis."""
     async with rig.link() as bus:

@@ -120,6 +120,7 @@ async def test_a_drive_with_a_mailbox_unlike_ours_is_read_and_written(bus: Bus) 
         await bus.link.close()
 
 
+@pytest.mark.long
 async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus) -> None:
     await bus.link.open()
     cyclic = bus.link.process_data
@@ -149,6 +150,7 @@ async def test_its_fixed_process_data_on_swapped_sync_managers_move_it(bus: Bus)
         await bus.link.close()
 
 
+@pytest.mark.long
 async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus: Bus) -> None:
     await bus.link.open()
     try:

@@ -67,6 +67,7 @@ def finish(process: subprocess.Popen[str]) -> dict[str, Any]:
     return answer
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 4])
 def test_soem_takes_the_segment_to_op(namespace: Namespace, count: int) -> None:
     with segment(namespace, count) as running:
@@ -91,6 +92,7 @@ def test_soem_takes_the_segment_to_op(namespace: Namespace, count: int) -> None:
     assert [s["station"] for s in state["slaves"]] == [0x1001 + n for n in range(count)]
 
 
+@pytest.mark.long
 def test_in_lockstep_a_target_comes_back_as_position_two_frames_later(
     namespace: Namespace,
 ) -> None:
@@ -180,6 +182,7 @@ class Master:
         return answer
 
 
+@pytest.mark.long
 def test_trouble_on_the_wire_as_the_master_sees_it(
     namespace: Namespace, shared: VirtualSegment
 ) -> None:
@@ -223,6 +226,7 @@ def test_one_segment_per_interface(namespace: Namespace, shared: VirtualSegment)
     assert len(shared.command("state")["slaves"]) == 2
 
 
+@pytest.mark.long
 def test_a_wrong_interface_and_a_wrong_drive_are_reported_in_words(namespace: Namespace) -> None:
     with pytest.raises(LinkLost, match="cannot use interface nosuch0"):
         VirtualSegment.start("nosuch0", ["--drive", "dictionary", "--factory", FACTORY], namespace)
@@ -230,6 +234,7 @@ def test_a_wrong_interface_and_a_wrong_drive_are_reported_in_words(namespace: Na
         VirtualSegment.start(SLAVE, [], namespace)
 
 
+@pytest.mark.long
 def test_a_killed_segment_is_noticed_and_can_be_restarted(namespace: Namespace) -> None:
     running = segment(namespace, 1)
     running.kill()

@@ -36,6 +36,7 @@ def _as_remappable(profile: Profile) -> Profile:
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "setting", "after"),
     [

@@ -131,6 +131,7 @@ async def responded(way: Way) -> None:
     assert np.abs(found.frf.magnitude_db[inside]).max() < 0.2
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("name", SAMPLES)
 async def test_scan_jog_scope_and_response_with_the_file_alone(
     namespace: Namespace,
@@ -142,6 +143,7 @@ async def test_scan_jog_scope_and_response_with_the_file_alone(
         await responded(way)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ODD)
 async def test_scan_jog_and_scope_with_an_odd_file(namespace: Namespace, name: str) -> None:
     async with begun(namespace, name) as way:

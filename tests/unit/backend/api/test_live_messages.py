@@ -25,6 +25,7 @@ def types_of(schema: dict[str, Any]) -> set[str]:
     return set(schema["discriminator"]["mapping"])
 
 
+@pytest.mark.long
 def test_both_directions_are_described(schemas: dict[str, Any]) -> None:
     assert {"jog_start", "stop", "chat"} <= types_of(schemas["FromPage"])
     assert {"hello", "stop_result", "chat_said"} <= types_of(schemas["ToPage"])

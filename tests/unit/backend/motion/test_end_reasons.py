@@ -301,6 +301,7 @@ SLIPS = {
 }
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(("code", "content"), SLIPS.items())
 async def test_a_profile_that_cannot_be_used_says_why_by_code(
     http: httpx.AsyncClient,

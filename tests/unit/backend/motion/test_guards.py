@@ -21,6 +21,7 @@ async def bench(tmp_path: Path) -> AsyncIterator[Bench]:
     await bench.close()
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize(
     ("method", "path", "body"),
     [

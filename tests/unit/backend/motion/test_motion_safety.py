@@ -257,6 +257,7 @@ async def test_everything_that_could_not_be_restored_is_named(
         assert key in str(caught.value)
 
 
+@pytest.mark.long
 async def test_a_cleanup_that_takes_too_long_names_what_it_leaves(
     x: ConnectedDrive, servo: Servo, monkeypatch: pytest.MonkeyPatch
 ) -> None:

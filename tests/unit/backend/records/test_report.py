@@ -140,6 +140,7 @@ def test_values_are_shown_as_the_manual_means_them(drive: Drive) -> None:
 # --- what is concluded -----------------------------------------------------------------
 
 
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize(
     ("margins", "tone", "word"),
     [
@@ -379,6 +380,7 @@ def test_pdf_brings_its_fonts_along(facts: Facts) -> None:
             assert "/FontFile2" in font["/FontDescriptor"].get_object(), name
 
 
+@pytest.mark.long
 def test_pdf_takes_any_text(facts: Facts) -> None:
     long = "word " * 4000 + "a" * 3000 + "很长" * 2000
     changed = replace(

@@ -70,6 +70,7 @@ def test_hostile_files_take_no_square_of_their_size(
     assert time.thread_time() - before < MOST_S
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize(
     "data",
     [

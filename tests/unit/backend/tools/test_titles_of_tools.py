@@ -72,6 +72,7 @@ def waiting(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"backend.api.tuning.measure.{place}", put)
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.kind)
 @pytest.mark.usefixtures("waiting")
 async def test_a_started_measurement_has_its_title_in_both_languages(
