@@ -103,11 +103,6 @@ QUICK = [
     Check("lint", [str(BIN / "ruff"), "check", "."]),
     Check("types", TYPES),
     *(types_on(system) for system in ("win32", "darwin")),
-]
-#: Checks without a bus as well, next to those of the types: about as long as they.
-QUICK_BESIDE = [
-    Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
-    Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
     Check("client drift", [sys.executable, "tests/client_drift.py"]),
     Check("dependencies", [str(BIN / "deptry"), "."]),
     Check("import contracts", [str(BIN / "lint-imports")]),
@@ -115,6 +110,11 @@ QUICK_BESIDE = [
     Check("supply chain", [sys.executable, ".ci/supply", "--check"]),
     # Without --quiet, which drops the warnings before --strict counts them.
     Check("docs", [str(BIN / "mkdocs"), "build", "--strict"]),
+]
+#: Checks without a bus as well, next to the others: about as long as they.
+QUICK_BESIDE = [
+    Check("page: types and lint", [*NPM, "run", "--silent", "check"], ROOT / "webui"),
+    Check("page: unit tests", [*NPM, "run", "--silent", "test"], ROOT / "webui"),
 ]
 TIMED = [
     pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),

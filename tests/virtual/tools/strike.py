@@ -30,7 +30,7 @@ from drivers.link import Trajectory
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.can_rig import CanBench
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, Bench, mechanics, settings_of, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, Bench, mechanics, settings_of, silent
 
 #: From the trouble to the end of the work: the loop's second without samples, the braking, and one
 #: cleanup after the other that gives up after five seconds.
@@ -109,7 +109,9 @@ async def bench(drive: str, spec: MechanicsSpec) -> AsyncIterator[DirectBench]:
 async def measured(drive: str, spec: MechanicsSpec, *, tune: bool = False) -> Known:
     async with bench(drive, spec) as b:
         if tune:
-            settings = AutotuneSettings(WIDE, apply=False, motor_inertia_kgm2=ROTOR[drive])
+            settings = AutotuneSettings(
+                WIDE, budget_s=AMPLE_S, apply=False, motor_inertia_kgm2=ROTOR[drive]
+            )
             found = await autotune(b.axis, b.session, settings, silent())
             return Known(found.inertia, found.mechanics, found, meaning_of(b.axis.drive))
         outcome = await inertia(b.axis, b.session, InertiaSettings(WIDE), silent())
@@ -121,7 +123,7 @@ async def work(
 ) -> object:
     """One part of a tuning as the whole does it."""
     axis, session, name = b.axis, b.session, b.axis.drive.profile.drive
-    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=ROTOR[name])
+    settings = AutotuneSettings(WIDE, budget_s=AMPLE_S, motor_inertia_kgm2=ROTOR[name])
     if part in ("inertia", "sweep"):
         return await autotune(axis, session, settings, progress)
     assert known is not None

@@ -15,7 +15,7 @@ from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from backend.tools.sweep.stored import answer_of
 from drivers.virtual.wires.netns import Namespace
-from tests.virtual.tools.rig import WIDE, bench, errors, mechanics, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, bench, errors, mechanics, silent
 
 TWO = mechanics((1e-4, 20.0, 0.002), (5e-5, 100.0, 0.005))
 ONE = mechanics((1e-4, 60.0, 0.006))
@@ -67,7 +67,9 @@ async def test_autotune_keeps_its_promise_and_can_be_undone(namespace: Namespace
         before = await b.values()
         # One grant for the whole of it, as a job holds.
         with b.axis.granted("autotune"):
-            result = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
+            result = await autotune(
+                b.axis, b.session, AutotuneSettings(WIDE, budget_s=AMPLE_S), silent()
+            )
         assert result.applied is not None
         assert result.verified is not None
         predicted, measured = (

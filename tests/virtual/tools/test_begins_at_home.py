@@ -25,7 +25,7 @@ from drivers.cia402 import State
 from drivers.errors import NotAllowed, motion_halted
 from drivers.halt import Halted
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, mechanics, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, mechanics, silent
 from tests.virtual.tools.test_measured_again import SWINGING
 
 ONE = mechanics((1e-4, 60.0, 0.006))
@@ -101,7 +101,7 @@ async def test_after_gains_that_took_all_the_torque(monkeypatch: pytest.MonkeyPa
     async with direct(ONE, drive="r6l") as b:
         away = Away(b, Halted.beyond("torque", 9, 8))
         monkeypatch.setattr(tuning.inertia_tool, "inertia", away.part)
-        settings = AutotuneSettings(WIDE, motor_inertia_kgm2=5e-5)
+        settings = AutotuneSettings(WIDE, budget_s=AMPLE_S, motor_inertia_kgm2=5e-5)
         with pytest.raises(Ended):
             await autotune(b.axis, b.session, settings, silent())
         assert away.begun_rev[1] == pytest.approx(away.begun_rev[0], abs=0.05)

@@ -23,7 +23,7 @@ from backend.tools.sweep.evaluation import SweepSettings
 from backend.tools.sweep.run import sweep
 from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, errors, mechanics, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, errors, mechanics, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
 SOFT = mechanics((5e-4, 12.0, 0.03), viscous=5e-4, coulomb=0.05)
@@ -99,7 +99,9 @@ async def test_inertia_between_ends_that_are_found() -> None:
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not report its motor's inertia, which its inertia ratio counts in.
-    settings = AutotuneSettings(WIDE, motor_inertia_kgm2=None if drive == "mms7" else 5e-5)
+    settings = AutotuneSettings(
+        WIDE, budget_s=AMPLE_S, motor_inertia_kgm2=None if drive == "mms7" else 5e-5
+    )
     async with direct(ONE, 5e-4, drive=drive) as b:
         # One grant for the whole of it, as a job holds.
         with b.axis.granted("autotune"):

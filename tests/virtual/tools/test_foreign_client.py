@@ -23,7 +23,7 @@ from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.autotune.tool import answer_of
 from tests.unit.recording.support import block, header
 from tests.virtual.tools.direct import direct
-from tests.virtual.tools.rig import WIDE, mechanics, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, mechanics, silent
 
 ROOT = Path(__file__).parents[3]
 
@@ -65,7 +65,9 @@ def _job(result: object) -> str:
 @pytest.mark.long
 async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     async with direct(mechanics((1e-4, 60.0, 0.006)), 5e-4) as b:
-        found = await autotune(b.axis, b.session, AutotuneSettings(WIDE), silent())
+        found = await autotune(
+            b.axis, b.session, AutotuneSettings(WIDE, budget_s=AMPLE_S), silent()
+        )
     answer = answer_of(found).model_dump(mode="json")
 
     def read(result: object, kind: str) -> object:

@@ -35,7 +35,7 @@ from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 from tests.virtual.tools.can_rig import can_bench
 from tests.virtual.tools.direct import direct
-from tests.virtual.tools.rig import mechanics, silent
+from tests.virtual.tools.rig import AMPLE_S, mechanics, silent
 
 RPM_CODE = 0x00B44700  # CiA 303-2: revolutions per minute
 TENTH_RPM_CODE = 0xFFB44700
@@ -190,7 +190,9 @@ TOOLS: dict[str, Any] = {
     "inertia": lambda b: inertia(b.axis, b.session, InertiaSettings(ENVELOPE), silent()),
     "sweep": lambda b: sweep(b.axis, b.session, SweepSettings(ENVELOPE), silent()),
     "step": lambda b: step_response(b.axis, b.session, StepSettings(ENVELOPE), silent()),
-    "autotune": lambda b: autotune(b.axis, b.session, AutotuneSettings(ENVELOPE), silent()),
+    "autotune": lambda b: autotune(
+        b.axis, b.session, AutotuneSettings(ENVELOPE, budget_s=AMPLE_S), silent()
+    ),
     "generate CSP": lambda b: generate(
         b.axis, b.session, GeneratorSettings("CSP", "sine", 0.1, 1.0, ENVELOPE), silent()
     ),

@@ -21,7 +21,7 @@ from backend.tools.autotune.tool import answer_of
 from backend.tools.measuring.temporary import put_back
 from backend.tools.sweep.evaluation import completed
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, At, mechanics, settings_of, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, At, mechanics, settings_of, silent
 
 TIGHT = mechanics((1e-4, 200.0, 0.01))
 LOOSE = mechanics((1e-4, 200.0, 0.01), backlash=0.002)
@@ -33,7 +33,7 @@ async def found_tight() -> AutotuneResult:
     """The table of candidates of the tight axis, measured once."""
     if not _FOUND:
         async with direct(TIGHT, _CYCLE_S) as b:
-            settings = AutotuneSettings(WIDE, apply=False)
+            settings = AutotuneSettings(WIDE, budget_s=AMPLE_S, apply=False)
             _FOUND.append(await autotune(b.axis, b.session, settings, silent()))
     return _FOUND[0]
 
@@ -41,7 +41,7 @@ async def found_tight() -> AutotuneResult:
 async def applied_loose(b: DirectBench, progress: Progress, keep: Any = None) -> AutotuneResult:
     found = await found_tight()
     facts = completed(await read_facts(b.axis), found.mechanics)
-    settings = AutotuneSettings(WIDE)
+    settings = AutotuneSettings(WIDE, budget_s=AMPLE_S)
     return await apply_and_verify(b.axis, b.session, settings, facts, found, progress, keep)
 
 

@@ -38,7 +38,7 @@ from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import Address
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench, direct
-from tests.virtual.tools.rig import WIDE, At, errors, mechanics, settings_of, silent
+from tests.virtual.tools.rig import AMPLE_S, WIDE, At, errors, mechanics, settings_of, silent
 
 ONE = mechanics((1e-4, 60.0, 0.006))
 FREE = mechanics((1e-4, 60.0, 0.006), coulomb=0.005)
@@ -56,7 +56,9 @@ class Family:
     rotor_kgm2: float | None = None
 
     def autotune(self, envelope: Envelope = WIDE, *, apply: bool = True) -> AutotuneSettings:
-        return AutotuneSettings(envelope, apply=apply, motor_inertia_kgm2=self.rotor_kgm2)
+        return AutotuneSettings(
+            envelope, budget_s=AMPLE_S, apply=apply, motor_inertia_kgm2=self.rotor_kgm2
+        )
 
 
 #: A notch at 900 Hz, as the coefficients of MMS7 (-6 dB, 150 Hz wide) and in M6-L's Hz. Ten times
