@@ -194,6 +194,7 @@ def gantry(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Demo]:
 LIMITS = {"travel_limit": 3.0, "speed_limit": 600.0, "torque_limit": 60.0, "time_limit_s": 60.0}
 
 
+@pytest.mark.long
 def test_the_gantry_tool_finds_a_beam_out_of_square(gantry: Demo) -> None:
     gantry.exchange(1000)
     asked = {"partner": "Right", "lead_mm": 10.0, "resolution_hz": 5.0}

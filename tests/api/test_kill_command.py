@@ -128,6 +128,7 @@ def test_a_sweep_killed_on_ethercat_is_reported_and_restored_by_a_command(etherc
     assert not list((ethercat.state / "restore").glob("*.json"))
 
 
+@pytest.mark.long
 def test_a_sweep_killed_on_canopen_is_restored_by_the_next_server(canopen: Bench) -> None:
     before, _ = canopen.held(MODE, RAMP)
     canopen.sweep_killed(RAMP, "--consent", "--cycle-ms", "4")

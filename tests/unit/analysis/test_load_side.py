@@ -47,6 +47,7 @@ def test_backlash_is_within_five_percent_or_two_counts_in_nine_of_ten_axes() -> 
     assert all(value.value > -value.half for _, value in found)
 
 
+@pytest.mark.long
 def test_stiffness_is_within_ten_percent_in_nine_of_ten_axes() -> None:
     found = [(case, value) for case, each in campaign() if (value := stiffness_of(each))]
     assert len(found) >= 40
