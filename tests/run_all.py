@@ -120,7 +120,7 @@ TIMED = [
     pytest("tests", *TWO, "-m", "not browser", "tests", *ignoring(REAL_TIME), *ignoring(PATIENT)),
 ]
 BUSES = [pytest("EtherCAT tests", *REAL_TIME)]
-PAGES = [pytest("browser tests", *TWO, "-m", "browser", "tests/browser")]
+PAGES = [pytest("browser tests", "-m", "browser", "tests/browser")]
 PARALLEL = [
     # Workers write to a pipe: tests of full disks bound the length of files.
     pytest("patient tests", *TWO, "--timeout=900", *PATIENT, *ignoring(REAL_TIME)),

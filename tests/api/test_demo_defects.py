@@ -170,6 +170,7 @@ def test_first_power_finds_it_and_names_the_next_step(demo: Demo, defect: Defect
     assert next_step in demo.report(defect)
 
 
+@pytest.mark.long
 def test_the_brake_test_finds_a_brake_that_slips(demo: Demo) -> None:
     result = demo.measured(SLIPPING, "brake-test", **ASKED, brake_supply_cut=True)
     assert result["verdict"] == "slipped"

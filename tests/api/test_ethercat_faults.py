@@ -237,6 +237,7 @@ def test_cut_cable_stops_the_axis_behind_it_and_heals(running: Segment) -> None:
     running.jogs()
 
 
+@pytest.mark.long
 def test_power_cycle_of_a_slave(running: Segment) -> None:
     before = running.lines()
     with running.station.live() as page, turning(page, running):

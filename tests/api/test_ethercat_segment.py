@@ -185,6 +185,7 @@ def test_no_eeprom_is_touched_while_the_exchange_runs(station: Station) -> None:
         station.http.delete("/buses/cyclic", params={"url": URL})
 
 
+@pytest.mark.long
 def test_the_command_line_saves_compares_and_restores(station: Station, tmp_path: Path) -> None:
     file = tmp_path / "eeprom.bin"
     at = ["--station", "2", "--server", station.url]

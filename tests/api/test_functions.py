@@ -185,6 +185,7 @@ def test_braking_is_calculated(station: Station) -> None:
     assert station.http.post("/calculate/braking", json={**body, "cycle_s": 0}).status_code == 422
 
 
+@pytest.mark.long
 def test_the_drive_identifies_by_itself(station: Station, x: str) -> None:
     body = {"travel_limit": 100, "timeout_s": 60}
     refused = station.job(station.http.post(f"/drives/{x}/jobs/identify", json=body))
@@ -201,6 +202,7 @@ def test_the_drive_identifies_by_itself(station: Station, x: str) -> None:
     assert station.state(x)["state"] == "Switch on disabled"
 
 
+@pytest.mark.long
 def test_an_identification_that_goes_too_far_is_ended(station: Station, x: str) -> None:
     body = {"travel_limit": 0.2, "timeout_s": 60, "confirmed": True}
     job = station.job(station.http.post(f"/drives/{x}/jobs/identify", json=body))

@@ -156,6 +156,7 @@ def test_m6l_switches_a_virtual_input_on(station: Station) -> None:
     assert terminals(station, "m6l")["DI9"]["on"] is False
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(
     ("family", "expected"),
     [

@@ -254,6 +254,7 @@ def test_an_axis_that_is_no_partner_refuses(gantry: Gantry, partner: str) -> Non
     assert refused.status_code == 409, refused.text
 
 
+@pytest.mark.long
 def test_a_fault_of_the_partner_ends_both(gantry: Gantry) -> None:
     job, before = gantry.moving()
     gantry.trouble("inject", slave=1, what="over_temperature")

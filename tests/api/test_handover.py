@@ -279,6 +279,7 @@ def test_bad_exports_are_explained(
     assert len(station.ok(station.http.get(f"/drives/{x}/handovers"))) == before
 
 
+@pytest.mark.long
 def test_an_uploaded_esi_file_is_read_in_a_process_with_bounded_memory(
     station: Station, x: str, held: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

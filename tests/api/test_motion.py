@@ -182,6 +182,7 @@ def test_move_outside_the_envelope_does_not_start(station: Station, x: str) -> N
     assert position(station, x) == pytest.approx(before, abs=0.001)
 
 
+@pytest.mark.long
 def test_a_move_and_a_jog_typed_in_millimetres(station: Station, x: str, page: Live) -> None:
     """A screw of 5 mm behind 2:1: 2.5 mm per motor revolution, and answers in mm."""
     body = {"mode": "PP", "target": 2.5, "relative": True, "speed": 25, "acceleration": 250,
@@ -300,6 +301,7 @@ def test_scope_delivers_samples_with_their_times(station: Station, x: str, page:
     assert sequences == list(range(1, len(sequences) + 1))
 
 
+@pytest.mark.long
 def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
     with jogged(station, page, x, fast):
         station.drives.command(do="power_cycle", axis="Feed screw", off_s=0.5)

@@ -67,6 +67,7 @@ def imported(station: Station, data: bytes, file: str, **query: Any) -> Any:
     return station.done(answer, 60)
 
 
+@pytest.mark.long
 def test_from_the_makers_file_to_a_moving_axis(station: Station) -> None:
     seen = station.done(station.http.post("/scan", json={"url": CAN, "stations": [5]}))["found"]
     assert [drive["station"] for drive in seen] == [5]
@@ -188,6 +189,7 @@ def test_classes_of_manual_and_standard_are_nobodys_to_change(
     assert station.http.delete(where).status_code == status
 
 
+@pytest.mark.long
 def test_a_broken_own_profile_spoils_only_itself(station: Station) -> None:
     made = imported(station, makers_eds(), "nova.eds", profile="broken_one")
     path = Path(made["path"])

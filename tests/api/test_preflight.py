@@ -51,6 +51,7 @@ def test_frames_on_a_private_cable(tmp_path: Path) -> None:
     assert set(json.loads((tmp_path / "preflight.json").read_text())) == {"lo", "ec0m"}
 
 
+@pytest.mark.long
 def test_an_interface_that_is_not_there_blocks_and_is_named_first(tmp_path: Path) -> None:
     done = command("nosuch0", "--seconds", "0", "--config", str(tmp_path))
     assert done.returncode == 1, done.stderr

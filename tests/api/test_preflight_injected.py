@@ -101,7 +101,7 @@ def first(found: list[str], before: set[str]) -> str:
     return next(code for code in found if code not in before)
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("interface", "without", "code"),
     [
@@ -118,6 +118,7 @@ def test_an_interface_or_a_capability_that_is_missing(
     assert first(computer.found(interface, without), before) == code
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("cause", "undo", "code"),
     [

@@ -59,6 +59,7 @@ def exported_csv(station: Station, name: str, kind: str = "csv") -> tuple[list[s
     return titles, np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
+@pytest.mark.long
 def test_record_list_export_delete(station: Station, x: str) -> None:
     row = start(station, x, name="Axis test", notes="warm machine", tags=["before"])
     assert row["state"] == "recording"

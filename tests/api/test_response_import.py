@@ -81,7 +81,7 @@ def test_a_filtered_speed_gives_no_inertia(station: Station) -> None:
     station.http.delete(f"/measurements/{info['file']}")
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     "content",
     [b"", os.urandom(1 << 16), gzip.compress(b"\0" * (300 << 20), 1), b"1,2\n" * 10, b"{}" * 999],
@@ -96,7 +96,7 @@ def test_hostile_files_are_refused_and_the_server_answers(station: Station, cont
     assert station.ok(station.http.get("/measurements")) == []
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["../../etc/passwd", "C:\\x\\y.csv", "", "测量.csv", "a" * 200])
 def test_a_name_makes_no_path(station: Station, name: str) -> None:
     rows = "\n".join(f"{i / 1000},{(i * i) % 97},{(i * i * i) % 89}" for i in range(2000))

@@ -130,6 +130,7 @@ def test_the_page_may_only_run_its_own_script(station: Station) -> None:
     assert "'unsafe-eval'" not in scripts
 
 
+@pytest.mark.long
 def test_what_a_page_sends_is_not_passed_on(
     station: Station, x: str, capfd: pytest.CaptureFixture[str]
 ) -> None:

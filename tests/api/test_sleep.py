@@ -34,6 +34,7 @@ def asleep(process: subprocess.Popen[str]) -> Iterator[None]:
         process.send_signal(signal.SIGCONT)
 
 
+@pytest.mark.long
 def test_an_axis_that_moved_meanwhile_is_stopped(drives: DemoBench, tmp_path: Path) -> None:
     server = ServerProcess(tmp_path / "state")
     try:

@@ -91,6 +91,7 @@ def test_units_are_rpm_and_times(station: Station, z: str) -> None:
     assert state["state"] == "Switch on disabled"
 
 
+@pytest.mark.long
 def test_jog_and_move(station: Station, z: str) -> None:
     with station.live() as page:
         limits = {"speed": 200, "acceleration": 4000, "travel_limit": 10, "torque_limit": 100}

@@ -53,6 +53,7 @@ def test_a_refused_reset_says_why(laptop: Page, bench: Bench) -> None:
     expect(page.get_by_text("No fault is active.")).to_be_visible()
 
 
+@pytest.mark.long
 def test_the_record_of_the_drive_is_not_pretended(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "alarms")

@@ -36,6 +36,7 @@ def test_a_release_in_a_busy_moment_is_final(laptop: Page, bench: Bench) -> None
         assert not resumes_after_release(laptop, bench, BLOCK_MS)
 
 
+@pytest.mark.long
 def test_a_page_that_is_busy_for_too_long_ends_the_hold(laptop: Page, bench: Bench) -> None:
     open_axis(laptop, bench.drive, "motion")
     hold(laptop, bench)

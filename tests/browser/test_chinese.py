@@ -76,7 +76,7 @@ def test_states_of_the_scene_are_chinese_with_the_english_in_brackets(
     assert below["y"] >= frame["y"] + frame["height"] - 1
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*AXIS_PAGES, *BENCH_PAGES])
 def test_no_phrase_stays_english(station: Station, x: str, chinese: Page, name: str) -> None:
     place = f"axis/{x}/{name}" if name in AXIS_PAGES else name

@@ -65,6 +65,7 @@ def test_a_cycle_is_read_and_shown(page: Page, station: Station, axis: str, mach
     assert jobs[machine["id"]] == "running"
 
 
+@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "机器循环负载")

@@ -123,6 +123,7 @@ def test_the_first_cause_is_the_injected_one(
         undo()
 
 
+@pytest.mark.long
 def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> None:
     """The drive refuses Safe-Op for its clock first, and takes the setting after a repair."""
     drop = refusing(0x0030)(station)

@@ -50,6 +50,7 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     assert defects == []
 
 
+@pytest.mark.long
 def test_from_the_code_to_the_roles(page: Page, people: People, station: Station) -> None:
     page.get_by_label("Code").fill(people.accounts.setup_code)
     page.get_by_label("Name").fill("Anna")

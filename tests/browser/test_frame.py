@@ -200,6 +200,7 @@ def test_control_is_taken_shown_and_given_back(laptop: Page, bench: Bench) -> No
     expect(page.get_by_role("button", name="Control is free")).to_be_visible()
 
 
+@pytest.mark.long
 def test_scope_draws_and_measures(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "overview")

@@ -117,7 +117,7 @@ def planted(station: Station, drive: str) -> tuple[bytes, dict[str, int]]:
     return tostring(root), changed
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_thirty_planted_conflicts_are_shown_and_no_other(
     width: str,
@@ -147,7 +147,7 @@ def test_thirty_planted_conflicts_are_shown_and_no_other(
     assert fits(page)
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_a_whole_segment_in_one_list(
     width: str, request: pytest.FixtureRequest, station: Station, held: int, tmp_path: Path

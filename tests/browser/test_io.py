@@ -85,6 +85,7 @@ def test_forcing_ends_with_the_connection(laptop: Page, bench: Bench, cable: Cab
     cable.mend()
 
 
+@pytest.mark.long
 def test_a_probe_is_set_up_and_shows_what_it_waits_for(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "io")

@@ -50,6 +50,7 @@ def test_jog_by_mouse(laptop: Page, bench: Bench) -> None:
     expect(laptop.get_by_text("Ended: released")).to_be_visible()
 
 
+@pytest.mark.long
 def test_sliding_off_the_button_still_ends_with_the_release(laptop: Page, bench: Bench) -> None:
     start = bench.state()["position"]
     _press(laptop, bench, MINUS)
@@ -70,6 +71,7 @@ def _touch(page: Page, end: str) -> tuple[Callable[[], None], Callable[[], None]
     return lambda: event("touchStart", {"x": x, "y": y}), lambda: event(end)
 
 
+@pytest.mark.long
 def test_jog_by_finger(phone: Page, bench: Bench) -> None:
     open_axis(phone, bench.drive, "motion")
     assert bench.jog(*_touch(phone, "touchEnd"), says_no(phone)) == "jog.end-released"
@@ -161,6 +163,7 @@ def test_the_jog_ends(laptop: Page, bench: Bench, cable: Cable, trouble: Any) ->
     cable.mend()
 
 
+@pytest.mark.long
 def test_the_jog_ends_when_page_and_worker_are_frozen(laptop: Page, bench: Bench) -> None:
     """A closed lid: the browser's processes get no time at all, and close no connection."""
     _press(laptop, bench)

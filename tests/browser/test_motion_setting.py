@@ -39,6 +39,7 @@ def test_what_moves_is_not_written_in_the_table(laptop: Page, bench: Bench, key:
     expect(page.get_by_role("heading", level=1)).to_contain_text("Motion")
 
 
+@pytest.mark.long
 def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: Bench) -> None:
     page = laptop
     assert bench.raw(SETTING) == 0

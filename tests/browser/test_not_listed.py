@@ -71,6 +71,7 @@ def test_import_from_the_connect_page(laptop: Page, station: Station, tmp_path: 
     station.ok(station.http.delete(f"/drives/{drive['id']}"))
 
 
+@pytest.mark.long
 def test_the_missing_port_is_connected(laptop: Page, station: Station) -> None:
     drive = station.add(3, "canopen://virtual0", "ds_c", "Z")
     page = laptop

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.driving import Bench, find, open_axis, row
@@ -73,6 +74,7 @@ def test_edit_write_save_and_power_cycle(laptop: Page, bench: Bench) -> None:
     expect(found.locator(".value")).to_have_text(str(wanted))
 
 
+@pytest.mark.long
 def test_what_cannot_be_written_is_not_kept(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw(ACCELERATION)
@@ -105,6 +107,7 @@ def test_table_with_the_keyboard_alone(laptop: Page, bench: Bench) -> None:
     assert bench.raw(ACCELERATION) == before + 7
 
 
+@pytest.mark.long
 def test_set_file_change_compare_load(laptop: Page, bench: Bench) -> None:
     page = laptop
     original = bench.raw(ACCELERATION)
@@ -142,6 +145,7 @@ def test_value_that_somebody_else_wrote_arrives(laptop: Page, bench: Bench) -> N
     expect(found.locator(".value")).to_have_text("4242")
 
 
+@pytest.mark.long
 def test_chinese_page_finds_parameters_in_both_languages_and_shows_the_original(
     laptop: Page, bench: Bench
 ) -> None:

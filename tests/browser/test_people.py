@@ -95,6 +95,7 @@ def button(page: Page | Locator, name: str) -> Locator:
 # --- log-in ---------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_nothing_is_shown_before_the_log_in(opened: Open, bench: Bench) -> None:
     page = opened(f"#/axis/{bench.drive}/motion")
     expect(page.get_by_role("heading", name="Log in")).to_be_visible()

@@ -112,6 +112,7 @@ def test_a_finger_presses_nothing_that_came_under_it(phone: Page, bench: Bench) 
     assert not [url for url in asked if "transition" in url]
 
 
+@pytest.mark.long
 def test_a_press_that_begins_nothing_says_why(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "motion")
@@ -173,6 +174,7 @@ def test_the_keyboard_stays_where_it_was(laptop: Page, bench: Bench) -> None:
     assert page.evaluate("document.activeElement === document.body")
 
 
+@pytest.mark.long
 def test_a_key_that_is_held_presses_once(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "motion")

@@ -158,6 +158,7 @@ def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path)
     expect(page.get_by_text("No recordings.")).to_be_visible()
 
 
+@pytest.mark.long
 def test_armed_kept_and_bounded_from_the_page(page: Page, bench: Bench) -> None:
     page.get_by_label("Begins").select_option("fault")
     page.get_by_label("Name").fill("waiting")

@@ -158,6 +158,7 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
     assert not any(slot["enabled"] for slot in slots)
 
 
+@pytest.mark.long
 def test_a_loop_is_shown_three_ways(laptop: Page, axis: str) -> None:
     page = laptop
     show(page, axis, "Speed loop")

@@ -260,6 +260,7 @@ def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, ca
     expect(lost).to_contain_text("while there was no connection")
 
 
+@pytest.mark.long
 def test_setups_references_and_snapshots_are_kept(page: Page, station: Station, axis: str) -> None:
     add_channel(page, "60F4")
     page.get_by_label("Time shown").select_option("0.5")

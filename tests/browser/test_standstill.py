@@ -106,6 +106,7 @@ def test_an_axis_that_turns_unasked_is_reported_on_every_page(
     expect(note).to_have_count(0)
 
 
+@pytest.mark.long
 def test_stop_says_of_each_axis_what_was_measured(phone: Page, pulled: Bench) -> None:
     page = phone
     open_axis(page, pulled.drive, "overview")

@@ -139,6 +139,7 @@ def test_the_tour_by_itself_moves_nothing_and_can_be_left(demo: Demo, phone: Pag
     expect(card(page)).to_have_count(0)
 
 
+@pytest.mark.long
 def test_the_tour_speaks_chinese(demo: Demo, phone: Page) -> None:
     phone.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     phone.reload()

@@ -237,6 +237,7 @@ def settings_of(station: Station, axis: str) -> tuple[object, object]:
     return gains, notches
 
 
+@pytest.mark.long
 def test_autotune_is_cancelled_while_the_axis_moves(
     page: Page, axis: str, station: Station
 ) -> None:

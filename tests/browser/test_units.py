@@ -61,6 +61,7 @@ def _move_in_millimetres(page: Page, bench: Bench) -> None:
     expect(target).to_have_value("")
 
 
+@pytest.mark.long
 def test_what_cannot_be_is_said_before_it_is_written(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
@@ -74,6 +75,7 @@ def test_what_cannot_be_is_said_before_it_is_written(laptop: Page, bench: Bench)
     expect(page.get_by_text("the ratio contains π")).to_be_visible()
 
 
+@pytest.mark.long
 def test_a_gain_is_written_and_undone(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("2005:03")
@@ -94,6 +96,7 @@ def test_a_gain_is_written_and_undone(laptop: Page, bench: Bench) -> None:
     until(lambda: bench.raw("2005:03") == before, what="it is as before")
 
 
+@pytest.mark.long
 def test_a_stop_option_is_chosen_in_words(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("605D:00")
@@ -107,6 +110,7 @@ def test_a_stop_option_is_chosen_in_words(laptop: Page, bench: Bench) -> None:
     bench.write("605D:00", before)
 
 
+@pytest.mark.long
 def test_the_resistor_of_the_manuals_example(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
@@ -122,6 +126,7 @@ def test_the_resistor_of_the_manuals_example(laptop: Page, bench: Bench) -> None
     expect(page.get_by_text(re.compile("This exceeds the built-in and external"))).to_be_visible()
 
 
+@pytest.mark.long
 def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")

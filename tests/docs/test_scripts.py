@@ -50,6 +50,7 @@ def test_inertia(station: Station) -> None:
     station.remove(drive)
 
 
+@pytest.mark.long
 def test_move(station: Station) -> None:
     drive = station.add(1, name="X")
     before = station.state(drive)["position"]

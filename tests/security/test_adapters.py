@@ -89,7 +89,7 @@ def written(scheme: str, place: str) -> list[str]:
             start + place.replace("?", "#"), f"{start}{once}?timeout_ms=500"]  # fmt: skip
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_no_url_of_pyserial_is_an_adapter(
@@ -158,6 +158,7 @@ async def test_a_saved_list_of_drives_opens_none(tmp_path: Path, listener: Liste
     assert listener.connected == 0
 
 
+@pytest.mark.long
 def test_the_command_line_opens_none(tmp_path: Path, listener: Listener) -> None:
     for url in (
         f"canopen://slcan/spy:%2F%2F%2Fdev%2Fptmx%3Ffile={tmp_path / 'made'}",

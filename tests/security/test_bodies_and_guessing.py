@@ -168,6 +168,7 @@ def test_waits_double_up_to_a_quarter_of_an_hour() -> None:
     assert throttle.wait_s("x") == 0
 
 
+@pytest.mark.long
 def test_a_password_costs_what_rfc_9106_asks() -> None:
     """Second recommendation of clause 4: 64 MiB and three passes."""
     kept = Passwords(DEFAULT)

@@ -276,6 +276,7 @@ def test_a_malformed_frame_ends_its_connection_only(
 # --- control and time -----------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_silent_connection_loses_control_within_two_seconds(
     server: GuardedServer, cast: Cast
 ) -> None:

@@ -74,6 +74,7 @@ def test_the_interface_keeps_to_its_description(server: GuardedServer) -> None:
     assert wrong == {}, "\n\n".join(f"{label}: {text}" for label, text in wrong.items())
 
 
+@pytest.mark.long
 def test_fuzzing_finds_no_way_in_for_a_viewer(server: GuardedServer) -> None:
     """What a viewer may not is refused whatever the body holds, before it is looked at."""
     schema = schemathesis.openapi.from_dict(server.interface)

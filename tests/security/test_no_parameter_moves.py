@@ -226,7 +226,7 @@ def loaded(scene: Scene, caller: Caller, file: str, keys: list[str]) -> dict[str
     return {row["key"]: row for row in result["rows"]} | {"": result}
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("way", ["set", "csv", "undo"])
 def test_no_set_moves_the_axis(scene: Scene, way: str) -> None:
     """A set, a CSV list and the undo of a set, loaded by a script with the right to write."""

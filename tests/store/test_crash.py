@@ -215,6 +215,7 @@ def test_two_stations_killed_in_turn_leave_one_chain(postgres: Postgres, tmp_pat
     assert {d["token"] for d in reported if d["act"] == "event"} <= {str(e.new) for e in events}
 
 
+@pytest.mark.long
 def test_the_server_of_the_database_may_go_and_come_back(
     postgres: Postgres, tmp_path: Path
 ) -> None:

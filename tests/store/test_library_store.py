@@ -177,7 +177,7 @@ def test_stations_share_it_and_save_at_once(
     assert contents == {f"{n} {t}".encode() for n in range(4) for t in range(5)}
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 def test_purging_takes_no_contents_away_that_are_being_used(
     make_store: Callable[[], Store], tmp_path: Path
 ) -> None:

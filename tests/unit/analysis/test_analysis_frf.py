@@ -140,6 +140,7 @@ def test_periods_with_a_gap_are_left_out():
         )
 
 
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 @pytest.mark.parametrize("delay_s", [0.0, 0.3e-3, 2.25e-3])
 def test_sampled_command_is_the_exact_response_of_hold_and_lag(hold, delay_s):

@@ -38,7 +38,7 @@ def measured(seed: int) -> Frf:
     )  # fmt: skip
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("seed", range(4))
 def test_lines_that_hide_the_whole_inertia_leave_what_moves_reported_of_it(seed: int) -> None:
     frf, whole = measured(seed), MOTOR + LOAD

@@ -60,7 +60,7 @@ def fan_on_an_arm(angle, speed):
     return arm(angle, speed) + fan(angle, speed)
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("ratio", [1, 10])
 @pytest.mark.parametrize("noise_nm", [0.002, 0.02])
 @pytest.mark.parametrize("torque_of", [unbalanced, arm, spring, fan, fan_on_an_arm])
@@ -98,6 +98,7 @@ def hose(angle, _speed):
     return 0.02 * force
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("ratio", [1, 8, 25])
 def test_a_hose_that_yields_is_friction_and_no_inertia(ratio):
     inertia = MOTOR * (1 + ratio)
@@ -126,7 +127,7 @@ def test_an_inertia_that_varies_by_the_position_is_neither_friction_nor_place(or
     assert result.load_terms.place_nm == 0.0
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ratio", [0, 1, 10, 30])
 @pytest.mark.parametrize("noise_nm", [0.0005, 0.002, 0.02])
 def test_nothing_is_seen_where_nothing_is(ratio, noise_nm):

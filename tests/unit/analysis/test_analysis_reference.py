@@ -77,7 +77,7 @@ def test_its_response_is_that_of_the_sequence(path):
     assert np.allclose(ratio, sampled_integral_response(f, path), atol=1e-9)
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("loop_hz", [15.0, 60.0])
 def test_the_gain_of_a_speed_loop_is_read_from_what_it_makes_of_its_reference(loop_hz):
     """A light axis answers fast: its own speed makes much of the torque, far up."""

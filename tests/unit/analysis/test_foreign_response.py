@@ -26,7 +26,7 @@ def real(column_in: int, column_out: int) -> tuple[np.ndarray, np.ndarray]:
     return table[:, column_in], table[:, column_out]
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("column_in", [1, 2])
 def test_the_real_bench_has_its_modes(column_in: int) -> None:
     found = evaluate(*real(column_in, 3), RATE)
@@ -43,6 +43,7 @@ def test_the_real_bench_has_its_modes(column_in: int) -> None:
         assert row.frequency_ci95_hz[1] - row.frequency_ci95_hz[0] < 2.0
 
 
+@pytest.mark.long
 def test_the_band_of_the_real_bench_is_neither_noise_alone_nor_idle() -> None:
     found = evaluate(*real(2, 3), RATE)
     mid = (found.frequency_hz > 90) & (found.frequency_hz < 200)
@@ -52,6 +53,7 @@ def test_the_band_of_the_real_bench_is_neither_noise_alone_nor_idle() -> None:
     assert np.max(half) < 1.5
 
 
+@pytest.mark.long
 def test_odd_lines_of_the_real_bench_predict_the_even_ones() -> None:
     """Away from the modes the truth is smooth: both odd neighbours give the line between them."""
     found = evaluate(*real(2, 3), RATE)
@@ -109,6 +111,7 @@ ROUGH = [
 ]  # fmt: skip
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("number", range(len(ROUGH)))
 def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
     bench = ROUGH[number]

@@ -82,6 +82,7 @@ def test_noise_alone_has_no_component() -> None:
     assert found == [[]] * 4
 
 
+@pytest.mark.long
 def test_orders_and_frequencies_are_told_apart_with_intervals_that_hold() -> None:
     inside, stated = 0, 0
     for seed in range(8):

@@ -82,7 +82,7 @@ def test_lines_too_blurred_for_a_margin_limit_delay_and_gain(
     assert better > 3.0
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(("late_s", "size"), [(0.0, 1.0), (150e-6, 1.0), (60e-6, 1.2)])
 def test_a_delay_and_a_gain_that_the_prediction_lacks_lie_in_their_intervals(
     monkeypatch: pytest.MonkeyPatch, late_s: float, size: float

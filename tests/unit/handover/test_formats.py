@@ -148,7 +148,7 @@ def test_sizes_and_byte_order_are_those_of_the_type() -> None:
     assert fromstring(xml).findtext(".//Data") == "40420f00"
 
 
-@pytest.mark.long(keep=20)
+@pytest.mark.long(keep=15)
 @pytest.mark.parametrize("form", [form for form in FORMATS if form != "python"])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_list_reads_back_and_is_exported_again_byte_by_byte(family: str, form: Format) -> None:

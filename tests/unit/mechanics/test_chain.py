@@ -67,6 +67,7 @@ def test_analytic_response_of_two_inertias_is_the_textbook_formula() -> None:
     np.testing.assert_allclose(analytic_response(mechanics, f), textbook, rtol=1e-12)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("mechanics", [spec(friction=FrictionSpec(viscous_nms=1e-3)), TWO_LOADS])
 def test_simulated_response_meets_the_analytic_one(mechanics: MechanicsSpec) -> None:
     """Within 0.1 dB and 1° up to 2 kHz, with hold and current loop removed exactly."""

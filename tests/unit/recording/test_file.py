@@ -143,6 +143,7 @@ while True:
 """
 
 
+@pytest.mark.long
 def test_killed_process_leaves_all_but_the_last_half_second(tmp_path: Path) -> None:
     path = tmp_path / "a.sdrec"
     child = subprocess.Popen(

@@ -30,6 +30,7 @@ def test_a_reading_counts_where_its_age_is_known_and_small(age_s: float, counts:
     assert (braking._seen(drive, "6041:00") == ENABLED) is counts
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("swings", [False, True])
 async def test_an_axis_that_swings_through_its_old_place_is_not_at_rest(
     swings: bool, tmp_path: Path

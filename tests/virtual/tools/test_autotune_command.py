@@ -106,7 +106,7 @@ def test_a_kept_design_is_verified_and_in_force(
     assert alone.state is not State.OPERATION_ENABLED
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_and_a_termination_leave_everything_as_it_was(
     monkeypatch: pytest.MonkeyPatch, number: signal.Signals

@@ -59,7 +59,7 @@ async def test_a_good_brake_holds_and_its_windup_is_no_slip(
         assert way.travel_rev <= 0.02
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "asked", "settings"), [("m6l", ASKED, M6L), ("r6l", CUT, {}), ("ep3e", CUT, {})]
 )
@@ -152,6 +152,7 @@ async def test_an_open_brake_moves_by_the_preload_alone() -> None:
     assert abs(way.travel_rev) < 0.3
 
 
+@pytest.mark.long
 async def test_a_supported_load_of_a_vertical_axis_adds_to_the_torque() -> None:
     """Positive is up: what lifts carries the load first, what lowers has it on its side."""
     pulls_nm = 0.2 * RATED_NM
@@ -162,7 +163,7 @@ async def test_a_supported_load_of_a_vertical_axis_adds_to_the_torque() -> None:
     assert down.torque_percent == pytest.approx(100 * (0.4 + COULOMB_NM / RATED_NM), rel=0.07)
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(
     ("drive", "asked", "settings", "obstacle"),
     [
@@ -196,6 +197,7 @@ async def test_nothing_moves_before_somebody_said_what_hangs_and_what_torque_is_
         assert bench.link.highest["torque"] == 0
 
 
+@pytest.mark.long
 async def test_a_test_that_is_cancelled_puts_the_output_back_and_takes_the_power_off() -> None:
     async with direct(braked(2.0 * RATED_NM), drive="m6l", settings=M6L) as bench:
         axis, drive = bench.axis, bench.axis.drive

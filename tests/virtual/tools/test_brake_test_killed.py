@@ -15,6 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from backend.commands.base.restoring import recall
 from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.station.bench import Bench
@@ -47,6 +49,7 @@ async def killed() -> None:
             await TOOL.run(Run(bench.axis, bench.session, at.progress), ASKED)
 
 
+@pytest.mark.long
 async def test_the_output_of_a_killed_brake_test_is_on_the_list_and_offered(
     tmp_path: Path,
 ) -> None:

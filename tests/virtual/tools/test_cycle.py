@@ -33,6 +33,7 @@ from tests.virtual.tools.set_ups.cycle import (
 )
 
 
+@pytest.mark.long
 async def test_the_cycle_of_a_machine_is_read_while_another_moves_it() -> None:
     kept: dict[str, Any] = {}
 

@@ -67,7 +67,7 @@ async def test_mechanics_beside_a_closed_loop(loop: str) -> None:
     assert near.covered >= 0.9
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "spec", "limit"),
     [("mms7", SOFT, 0.02), ("mms7", HEAVY, 0.05), ("m6l", ONE, 0.02), ("r6l", ONE, 0.02)],

@@ -84,7 +84,7 @@ async def test_shifted_phases_turn_the_shaft_against_the_torque() -> None:
     assert "Turn the shaft by hand to learn which it is" in words
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(("drive", "at_rev"), [("mms7", 0.0), ("ep3e", 0.05), ("r6l", 0.025)])
 async def test_exchanged_phases_lock_the_shaft(drive: str, at_rev: float) -> None:
     found, _ = await on(drive, planted(motor(), "phases_exchanged"), at_rev=at_rev)

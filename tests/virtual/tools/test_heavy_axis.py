@@ -53,6 +53,7 @@ def test_what_a_soft_loop_takes_is_known_before() -> None:
     assert soft_loop_of(short, speed, np.sin(40 * t), valid, rate) is None
 
 
+@pytest.mark.long
 async def test_a_heavy_axis_needs_one_attempt() -> None:
     async with direct(HEAVY, drive="r6l") as b:
         moves: list[int] = []

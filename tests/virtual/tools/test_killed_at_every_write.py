@@ -91,7 +91,7 @@ class Watch:
                 self.missing.append(f"{key} was {before}, on the disk {noted.get(key)}")
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("kind", [tool.kind for tool in TOOLS if tool.kind not in ELSEWHERE])
 async def test_what_a_tool_changes_is_on_the_disk_at_each_write(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -34,7 +34,7 @@ TOOLS: dict[str, tuple[str, Callable[[DirectBench, Progress], Awaitable[object]]
 }
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "tool", "trouble"),
     [("mms7", "inertia", "tripped"), ("r6l", "step", "tripped"), ("ep3e", "step", "stopped")],

@@ -99,7 +99,7 @@ class Late:
         return 2 if self._cycles == 900 and len(self.long) in self._numbers else 0
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("loop", ["none", "speed"])
 async def test_a_realisation_that_lost_samples_is_played_again(
     loop: Loop, monkeypatch: pytest.MonkeyPatch

@@ -42,7 +42,7 @@ def late(b: DirectBench, every_s: float, cycles_late: tuple[int, int]) -> None:
     b.link.late = cycles
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     ("drive", "every_s", "cycles_late"),

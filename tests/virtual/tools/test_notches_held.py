@@ -39,7 +39,7 @@ async def learned(b: DirectBench, found: SweepResult, progress: Progress) -> Not
     )
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["m6l", "r6l"])
 async def test_a_held_axis_learns_its_notches_and_stays_held(
     drive: str, monkeypatch: pytest.MonkeyPatch

@@ -62,6 +62,7 @@ async def test_gains_that_are_sound_and_faster_than_every_design_stay() -> None:
     assert abs(measured / predicted - 1) < 0.1
 
 
+@pytest.mark.long
 async def test_gains_without_margins_make_way_for_a_slower_design_that_says_so() -> None:
     await found_of(MMS7)
     async with unharmed(ONE, MMS7, settings=MMS7.wild) as b:

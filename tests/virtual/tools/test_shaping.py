@@ -111,6 +111,7 @@ async def test_a_stated_mode_that_the_motor_does_not_show_is_designed_for_and_no
     assert unstated == ["P09.27"]
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ending", ["cancelled", "fault"])
 async def test_everything_is_as_before_however_it_ends(ending: str) -> None:
     async with direct(arm(8.0)) as bench:

@@ -115,7 +115,7 @@ async def test_over_ethercat(
         await struck(b, lambda p: work(b, part, known, p), step, fraction, strike, mend)
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("part", "step"), [("inertia", "reciprocating move"), ("sweep", "realisation 2 of 2")]
 )

@@ -103,7 +103,7 @@ async def unharmed(
         assert after == before, {k: (before[k], after[k]) for k in before if before[k] != after[k]}
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 async def test_a_wrong_sign_is_reported(family: Family) -> None:
     async with unharmed(ONE, family, settings={"607E:00": family.polarity}) as b:
@@ -228,6 +228,7 @@ async def test_a_closed_brake_is_distinguished_from_an_axis(family: Family) -> N
             assert "brake" in (reported.value.remedy or "")
 
 
+@pytest.mark.long(keep=1)
 @families
 async def test_an_envelope_that_is_hit_ends_the_measurement(family: Family) -> None:
     narrow = Envelope(4.0, 1500.0, 20.0, 60.0)

@@ -56,6 +56,7 @@ async def _hold_for(hold: Hold, seconds: float) -> None:
     hold.release(END_OF_JOG["released"])
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("axis", sorted({"generic402", "ds_c"} & set(drive_names())), indirect=True)
 async def test_jog_by_short_moves(axis: Axis) -> None:
     start = await axis.position_raw()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import pytest
 from typer.testing import CliRunner
 
 from backend import cli
@@ -35,6 +36,7 @@ async def test_a_node_and_a_broken_one(bench: Bench, link: CanopenLink) -> None:
     assert found["sdo-no-object"][0]["expected"] == "06020000h"
 
 
+@pytest.mark.long
 def test_the_command_line_shows_verdicts_in_both_languages(bench: Bench) -> None:
     run = CliRunner().invoke
     good = run(cli.app, ["conformance", bench.url, "--station", "5"])

@@ -156,6 +156,7 @@ async def ports(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator
         slave.stop()
 
 
+@pytest.mark.long(keep=1)
 async def test_a_move_commanded_over_can_is_seen_over_modbus(ports: TwoPorts) -> None:
     await ports.set(ports.bus, "6060:00", 1)
     await ports.enable(ports.bus)

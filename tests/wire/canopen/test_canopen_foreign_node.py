@@ -78,6 +78,7 @@ async def test_it_is_found_read_and_written(bus: str) -> None:
         await link.close()
 
 
+@pytest.mark.long
 async def test_a_node_that_sends_no_pdo_is_diagnosed_as_one(bus: str) -> None:
     """Its dictionary takes the mapping, and nothing acts on it."""
     link = CanopenLink(bus)

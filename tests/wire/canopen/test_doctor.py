@@ -46,6 +46,7 @@ async def test_a_healthy_node_reaches_operational_and_is_put_back(
     assert link.quality(NODE).details["boots"] == before
 
 
+@pytest.mark.long
 async def test_the_examination_starts_no_life_guarding(bench: Bench, link: CanopenLink) -> None:
     """The first request of guarding would start it (CiA 301 clause 7.2.8.3.2.1)."""
     read = bench.device.read

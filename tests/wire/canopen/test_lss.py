@@ -67,6 +67,7 @@ async def test_a_node_without_number_says_nothing_else(bench: Bench, link: Canop
     assert [each.station for each in found] == [5]
 
 
+@pytest.mark.long
 async def test_it_is_found_bit_by_bit_and_given_a_number(bench: Bench, link: CanopenLink) -> None:
     found = await link.lss.search(quiet)
     assert found is not None
@@ -160,6 +161,7 @@ async def test_of_several_without_number_each_is_found_in_turn(
     await until(lambda: {node.node_id for node in bench.wire.nodes} == {10, 5, 11})
 
 
+@pytest.mark.long
 def test_an_answer_that_comes_late_does_not_lose_the_node() -> None:
     """The bit that it belongs to is read as one, and the node confirms no such number."""
     slave = LssSlave(LssIdentity(0x1234, 0x56, 3, SERIAL), 255)

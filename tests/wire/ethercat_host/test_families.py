@@ -43,6 +43,7 @@ async def test_fixed_process_data_and_no_clock(odd_rig: Rig) -> None:
         await link.process_data.stop()
 
 
+@pytest.mark.long
 async def test_firmware_goes_in_with_progress(odd_rig: Rig) -> None:
     async with odd_rig.link() as bus:
         steps: list[float] = []

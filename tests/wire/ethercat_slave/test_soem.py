@@ -103,6 +103,7 @@ def test_in_lockstep_a_target_comes_back_as_position_two_frames_later(
     assert got["positions"][2:] == list(range(298))
 
 
+@pytest.mark.long
 def test_without_process_data_the_watchdog_acts(
     namespace: Namespace, shared: VirtualSegment
 ) -> None:
@@ -119,6 +120,7 @@ def test_an_emergency_reaches_the_master(namespace: Namespace, shared: VirtualSe
     assert finish(process)["codes"] == [0x7305]
 
 
+@pytest.mark.long
 def test_what_strangers_do_with_pysoem(namespace: Namespace) -> None:
     with segment(namespace, 1):
         got = finish(start(namespace, "stranger"))

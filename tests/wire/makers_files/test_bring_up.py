@@ -77,7 +77,7 @@ INPUTS = [signal(0x6041, "UINT16"), signal(0x6064, "INT32"), signal(0x606C, "INT
 OUTPUTS = [signal(0x6060, "INT8"), signal(0x607A, "INT32"), signal(0x60FF, "INT32")]
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("name", SAMPLES)
 async def test_from_the_file_to_process_data(namespace: Namespace, name: str) -> None:
     async with brought(namespace, name) as (link, segment):

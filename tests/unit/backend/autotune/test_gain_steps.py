@@ -132,7 +132,7 @@ def test_a_loop_that_has_margin_left_is_stable(
     assert seen_stable(loop, 9.0) == 1.0
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("noise", [0.0, 0.3])
 @pytest.mark.parametrize("beyond_db", [0.3, 2.0])
 @pytest.mark.parametrize("delay", [6, 12, 20])

@@ -31,7 +31,7 @@ def test_version() -> None:
     assert servodeck("--version").stdout == f"servodeck {__version__}\n"
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("arguments", "environment"),
     [(("--language", "zh"), {}), ((), {"LANG": "zh_CN.UTF-8"}), ((), {"LC_ALL": "zh_TW"})],

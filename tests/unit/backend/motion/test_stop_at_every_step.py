@@ -189,7 +189,7 @@ def tried(count: int) -> list[int]:
     return [n for n in range(1, count + 1) if n <= EDGE or n > count - EDGE or n % 10 == 0]
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("motion", [enable, move_and_cancel, jog_and_release, move_while_enabled])
 def test_nothing_enables_or_moves_after_stop_at_any_access(motion: Motion) -> None:
     async def every_access() -> None:

@@ -12,6 +12,7 @@ import pytest
 from tests.support.station import until
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has classes of priority, no steps")
 @pytest.mark.parametrize(
     "module",

@@ -52,6 +52,7 @@ def found(recording: Recording) -> InertiaResult:
     return evaluate(recording, SETTINGS, FACTS)
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("offset", [False, True])
 @pytest.mark.parametrize("loop_1_s", [15.0, 60.0])
 def test_the_gain_of_the_loop_is_seen_whatever_the_units(loop_1_s: float, offset: bool) -> None:
