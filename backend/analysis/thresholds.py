@@ -247,6 +247,30 @@ class loop_verdict:
     """[count] Origin: d16e3511."""
 
 
+class mode_above:
+    """`loop/mode_above.py`."""
+
+    LEADS_DEG = 30.0
+    """[deg] A speed that leads the torque by more is that of a spring; below a resonance it is 90
+    degrees. Origin: benchmarks/rough_campaign, axis 332."""
+    LINES = 8
+    """[count] Fewer lines that lead show no spring. Origin: benchmarks/rough_campaign, axis 332."""
+    OFF = 0.02
+    """[ratio] What a line may be off by. Origin: as reference_path.OFF."""
+    # NEAREST, FARTHEST, PLACES: Frequencies that are tried, over that of the highest line.
+    NEAREST = 1.02
+    """[ratio] Origin: benchmarks/rough_campaign, axis 332."""
+    FARTHEST = 4.0
+    """[ratio] Origin: benchmarks/rough_campaign, axis 332."""
+    PLACES = 60
+    """[count] Origin: benchmarks/rough_campaign, axis 332."""
+    ALIKE = 0.25
+    """[ratio] Modes whose mean square misfit, in units of OFF, is larger by less than this are all
+    possible: lines that are off by half of it in the same way. Origin: test_mode_above.py."""
+    DAMPINGS = (0.01, 0.03, 0.08)
+    """[ratio] Dampings that are tried for it. Origin: couplings of benchmarks/tune_accuracy."""
+
+
 class measured_plant:
     """`loop/measured_plant.py`."""
 
