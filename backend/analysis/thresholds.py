@@ -240,11 +240,17 @@ class loop_verdict:
     """[deg] Origin: 886716e8."""
     WORST_DB = 1.0
     """[dB] Origin: 886716e8."""
-    # SIZES, DELAYS: So many sizes and delays are looked at between the ends of their intervals.
+    # SIZES, DELAYS, APART_DEG: So many sizes and delays are looked at between the ends of their
+    # intervals; of delays as many, within these limits, as turn the last crossover by no more.
     SIZES = 3
     """[count] Origin: d16e3511."""
-    DELAYS = 5
-    """[count] Origin: d16e3511."""
+    DELAYS = (5, 41)
+    """[count] Origin: d16e3511, benchmarks/rough_campaign."""
+    APART_DEG = 3.0
+    """[deg] Below WORST_DEG. Origin: benchmarks/rough_campaign."""
+    LEFT_STEPS = 21
+    """[count] Sizes, and as many delays, over which the mean of what a raised gain leaves is
+    formed. Origin: benchmarks/rough_campaign."""
 
 
 class mode_above:
