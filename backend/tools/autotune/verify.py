@@ -109,6 +109,8 @@ class Check:
     """Position where each verification begins, wherever the one before ended."""
     pairs_before: int = 0
     """Realisations that the prediction was derived from; they must not be used to verify it."""
+    speed_dropped: bool = False
+    """Whether the reported speed contradicts the position, which shows the loop then."""
     plant: MeasuredPlant | None = None
     """Plant that the design was made for; unmeasured parts of the loop are predicted from it."""
 
@@ -151,6 +153,7 @@ async def verify(
         coulomb_nm=check.coulomb_nm,
         reference_rad_s=reference.peak_rad_s if reference else None,
         reference_corner_hz=reference.corner_hz if reference else None,
+        speed_dropped=check.speed_dropped,
     )
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
