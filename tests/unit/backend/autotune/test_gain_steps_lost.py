@@ -148,6 +148,7 @@ async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch)
     assert place == 0.0
     # A loop that hardly moves back begins again where it began.
     ways[-1], place = -0.1, 0.0
-    stepped.clear(), returned.clear()
+    stepped.clear()
+    returned.clear()
     await raising.gain_steps(axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING)
     assert [number for number, _gain in returned] == [2, 4, 5]
