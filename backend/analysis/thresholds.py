@@ -240,11 +240,41 @@ class loop_verdict:
     """[deg] Origin: 886716e8."""
     WORST_DB = 1.0
     """[dB] Origin: 886716e8."""
-    # SIZES, DELAYS: So many sizes and delays are looked at between the ends of their intervals.
+    # SIZES, DELAYS, APART_DEG: So many sizes and delays are looked at between the ends of their
+    # intervals; of delays as many, within these limits, as turn the last crossover by no more.
     SIZES = 3
     """[count] Origin: d16e3511."""
-    DELAYS = 5
-    """[count] Origin: d16e3511."""
+    DELAYS = (5, 41)
+    """[count] Origin: d16e3511, benchmarks/rough_campaign."""
+    APART_DEG = 3.0
+    """[deg] Below WORST_DEG. Origin: benchmarks/rough_campaign."""
+    LEFT_STEPS = 21
+    """[count] Sizes, and as many delays, over which the mean of what a raised gain leaves is
+    formed. Origin: benchmarks/rough_campaign."""
+
+
+class mode_above:
+    """`loop/mode_above.py`."""
+
+    LEADS_DEG = 30.0
+    """[deg] A speed that leads the torque by more is that of a spring; below a resonance it is 90
+    degrees. Origin: benchmarks/rough_campaign, axis 332."""
+    LINES = 8
+    """[count] Fewer lines that lead show no spring. Origin: benchmarks/rough_campaign, axis 332."""
+    OFF = 0.02
+    """[ratio] What a line may be off by. Origin: as reference_path.OFF."""
+    # NEAREST, FARTHEST, PLACES: Frequencies that are tried, over that of the highest line.
+    NEAREST = 1.02
+    """[ratio] Origin: benchmarks/rough_campaign, axis 332."""
+    FARTHEST = 4.0
+    """[ratio] Origin: benchmarks/rough_campaign, axis 332."""
+    PLACES = 60
+    """[count] Origin: benchmarks/rough_campaign, axis 332."""
+    ALIKE = 0.25
+    """[ratio] Modes whose mean square misfit, in units of OFF, is larger by less than this are all
+    possible: lines that are off by half of it in the same way. Origin: test_mode_above.py."""
+    DAMPINGS = (0.01, 0.03, 0.08)
+    """[ratio] Dampings that are tried for it. Origin: couplings of benchmarks/tune_accuracy."""
 
 
 class measured_plant:

@@ -80,6 +80,9 @@ class autotune_gain_steps:
     """[count] Origin: d16e3511."""
     FEW = 8
     """[count] Fewer samples than this in a piece show no bands. Origin: d16e3511."""
+    BACK = 0.25
+    """[ratio] Steps begin again where they began to this share of their way: torque that depends on
+    the position is the same there. Origin: benchmarks/rough_campaign."""
     RECEIVED = 0.9
     """[ratio] Share of the samples of a steady part without which nothing is concluded from it:
     a gap of 12 ms may hide an oscillation. Origin: test_gain_steps_lost.py."""
@@ -139,15 +142,27 @@ class autotune_raising:
     """[dB] Origin: 17b160fe."""
     MOST_SHOWN_DB = 7.0
     """[dB] Origin: 17b160fe."""
-    # SURELY_DB, AT_ONCE_DB, KEPT_BACK_DB: A gain is raised by this beyond what excludes a loop, as
-    # a parameter has steps; and where that is more than what must be shown and this, it stays so
-    # far below the predicted margin.
+    # SURELY_DB, AT_ONCE_DB, LEAST_LEFT_DB: A gain is raised by this beyond what excludes a loop, as
+    # a parameter has steps; and where that is more than what must be shown and this, it leaves so
+    # much of the gain margin of the design: the amplified noise of a loop with 1 dB is no onset.
     SURELY_DB = 0.2
     """[dB] Origin: d16e3511."""
     AT_ONCE_DB = 0.5
     """[dB] Origin: d16e3511."""
+    MOST_DB = 20.0
+    """[dB] Nothing is raised further: eight steps, each of two to three seconds. Origin:
+    benchmarks/rough_campaign."""
+    LEAST_LEFT_DB = 1.0
+    """[dB] Origin: benchmarks/rough_campaign; autotune_gain_steps.NOISE."""
     KEPT_BACK_DB = 2.5
-    """[dB] Origin: d16e3511."""
+    """[dB] A raise is sure to end before an onset where every possible loop has so much more gain
+    margin. Origin: d16e3511."""
+    # SOFTER, SOFTER_STEPS: Where no raise shows the margins of a design, shares of its gains are
+    # tried, each this much of the one before.
+    SOFTER = 0.92
+    """[ratio] Origin: benchmarks/rough_campaign."""
+    SOFTER_STEPS = 12
+    """[count] Down to 0.37 of the gains. Origin: benchmarks/rough_campaign."""
 
 
 class autotune_reference:

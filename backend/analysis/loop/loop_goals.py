@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.signals.arrays import BoolArray, ComplexArray
+from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import loop_goals as threshold
 
 LoadClass = Literal["stiff", "medium", "compliant"]
@@ -98,6 +98,37 @@ def worst_of(loops: ComplexArray) -> Worst:
         if inside.size:
             gain_margin = min(60.0, float(-20.0 * np.log10(np.max(inside))))
     return Worst(gain_margin, phase_margin, sensitivity_peak(loops), bool(np.all(stable(loops))))
+
+
+@dataclass(frozen=True)
+class Each:
+    """Margins as in `Worst`, of each loop [shifts]."""
+
+    gain_margin_db: FloatArray
+    phase_margin_deg: FloatArray
+    ms: FloatArray
+    stable: BoolArray
+
+
+def each_of(loops: ComplexArray) -> Each:
+    """Return the margins of each open loop [shifts, lines], as `worst_of` of one at a time."""
+    over = loops.real**2 + loops.imag**2 > 1.0
+    row, line = np.nonzero(over[:, 1:] != over[:, :-1])
+    phase = np.full(len(loops), np.inf)
+    for at in (line, line + 1):
+        np.minimum.at(phase, row, np.degrees(np.abs(np.angle(-loops[row, at]))))
+    phase[np.isinf(phase)] = 90.0
+    real, imag = loops.real, loops.imag
+    flips = (imag[:, 1:] > 0) != (imag[:, :-1] > 0)
+    row, line = np.nonzero(flips & (real[:, 1:] < 0) & (real[:, :-1] < 0))
+    low, high = imag[row, line], imag[row, line + 1]
+    share = low / (low - high)
+    level = -(real[row, line] * (1.0 - share) + real[row, line + 1] * share)
+    inside = level < 1.0
+    gain = np.full(len(loops), 60.0)
+    np.minimum.at(gain, row[inside], -20.0 * np.log10(level[inside]))
+    peak = 1.0 / np.sqrt(np.min((1.0 + real) ** 2 + imag**2, axis=1))
+    return Each(gain, phase, np.asarray(peak), stable(loops))
 
 
 def sensitivity_peak(loops: ComplexArray) -> float:

@@ -78,6 +78,15 @@ class Gains:
     position_1_s: float
     speed_bandwidth_hz: float
 
+    def times(self, share: float) -> Gains:
+        """Gains of a loop that is slower by this share."""
+        return Gains(
+            share * self.speed_nms,
+            share * self.integral_hz,
+            share * self.position_1_s,
+            share * self.speed_bandwidth_hz,
+        )
+
 
 def speed_loop(
     frequency_hz: FloatArray, plant: ComplexArray, fixed: ComplexArray, gains: Gains

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.loop.loop_goals import Goals, sensitivity_peak, stable, worst_of
+from backend.analysis.loop.loop_goals import Goals, each_of, sensitivity_peak, stable, worst_of
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import loop_verdict as threshold
 
@@ -106,30 +106,61 @@ class LoopVerdict:
         none.
 
         The stated figures must reach the goals within the tolerances. The worst ends of the
-        intervals of each band must not be more than `WORST_DEG` or `WORST_DB` below them.
+        intervals of each band must not be more than `WORST_DEG` or `WORST_DB` below them. What the
+        lines show ends as "stated" or "measured"; what is predicted, and a loop among the possible
+        ones that is not stable, as "predicted".
         """
         found = []
         if self.contradicted:
             found.append(Missed("contradiction", self.shown_gain_db or 0.0, 0.0))
         if not self.stable:
-            found.append(Missed("stability", 0.0, 1.0))
+            found.append(Missed("stability", 0.0, 1.0, "predicted"))
         if self.coverage == "predicted" and self.uncovered_hz is not None:
             found.append(Missed("coverage", *self.uncovered_hz))
-        pairs: tuple[tuple[Missing, float, float, float], ...] = (
-            ("phase_margin", self.stated.phase_margin_deg, guaranteed.phase_margin_deg, margin_deg),
-            ("gain_margin", self.stated.gain_margin_db, guaranteed.gain_margin_db, margin_db),
-        )
-        for what, value, limit, slack in pairs:
-            if value < limit - slack:
-                found.append(Missed(what, value, limit))
-        if self.stated.ms > guaranteed.ms * ms_ratio:
-            found.append(Missed("peak_sensitivity", self.stated.ms, guaranteed.ms))
+        slack = (margin_deg, margin_db, ms_ratio)
+        found += _below(self.measured, "stated", guaranteed, *slack)
         reported = {each.what for each in found}
         ends = (
             *_short(self.measured, "measured", guaranteed),
             *_short(self.designed, "predicted", guaranteed),
+            *_below(self.predicted, "predicted", guaranteed, *slack),
         )
-        return (*found, *(each for each in ends if each.what not in reported))
+        for each in ends:
+            if each.what not in reported:
+                found.append(each)
+                reported.add(each.what)
+        return tuple(found)
+
+
+def _below(
+    band: BandVerdict | None,
+    end: End,
+    guaranteed: Goals,
+    margin_deg: float,
+    margin_db: float,
+    ms_ratio: float,
+) -> list[Missed]:
+    """Stated values of a band that miss a guaranteed one by more than the tolerances.
+
+    Of a prediction the worst end of the interval is named, as everywhere.
+    """
+    if band is None:
+        return []
+
+    def named(each: Interval, worst: float) -> float:
+        return worst if end == "predicted" else each.value
+
+    found = []
+    phase, gain, peak = band.phase_margin_deg, band.gain_margin_db, band.peak_sensitivity
+    if phase is not None and phase.value < guaranteed.phase_margin_deg - margin_deg:
+        limit = guaranteed.phase_margin_deg
+        found.append(Missed("phase_margin", named(phase, phase.low), limit, end))
+    if gain is not None and gain.value < guaranteed.gain_margin_db - margin_db:
+        limit = guaranteed.gain_margin_db
+        found.append(Missed("gain_margin", named(gain, gain.low), limit, end))
+    if peak is not None and peak.value > guaranteed.ms * ms_ratio:
+        found.append(Missed("peak_sensitivity", named(peak, peak.high), guaranteed.ms, end))
+    return found
 
 
 def _short(band: BandVerdict | None, end: End, guaranteed: Goals) -> list[Missed]:
@@ -185,25 +216,29 @@ def judge(
     )
     # The measured delay may worsen the prediction beyond the band, but never improve it.
     delay = Interval(max(delay.value, 0.0), max(delay.low, 0.0), max(delay.high, threshold.LATE_S))
-    possible = _moved(frequency_hz, loops, gain, delay)
+    possible, likely = _moved(frequency_hz, loops, gain, delay)
     contradicted = False
     if shown_gain_db is not None:
-        more = possible * 10 ** (shown_gain_db / 20.0)
-        left = possible[np.asarray(stable(more))]
+        left = np.asarray(stable(possible * 10 ** (shown_gain_db / 20.0)))
         # If no loop of the set explains the measurement, the set is wrong and supports no
         # statement.
-        contradicted = not left.size
-        possible = possible if contradicted else left
+        contradicted = not np.any(left)
+        if not contradicted:
+            possible, likely = possible[left], likely[left]
     gap = _gap(lines if seen is not None else None, frequency_hz, possible)
     coverage: Coverage = "measured" if gap.uncovered_hz is None else "predicted"
     if coverage == "predicted" and shown_gain_db is not None:
         coverage = "gain_steps"
     nominal_only = _moved_once(frequency_hz, nominal, gain, delay)
+    if shown_gain_db is not None:
+        found = _left_of(frequency_hz, nominal, gain, delay, shown_gain_db)
+        # With none of its gains and delays the nominal plant is what is left: another one is.
+        nominal_only = possible[[int(np.argmax(likely))]] if found is None else found
     designed = _beyond(frequency_hz, possible, nominal_only, gap)
     sound = bool(np.all(stable(possible)))
     every = possible
     if alternatives is not None and shown_gain_db is not None:
-        others = _moved(frequency_hz, alternatives, gain, delay)
+        others, _likely_too = _moved(frequency_hz, alternatives, gain, delay)
         others = others[np.asarray(stable(others * 10 ** (shown_gain_db / 20.0)))]
         every = np.concatenate([possible, others])
     beyond = _beyond(frequency_hz, every, nominal_only, gap, threshold.PER_OCTAVE, shown_gain_db)
@@ -326,18 +361,28 @@ def _known(found: tuple[float, float] | None, least: float, unseen: float) -> In
 
 def _moved(
     frequency_hz: FloatArray, loops: ComplexArray, size: Interval, late_s: Interval
-) -> ComplexArray:
-    """Every loop with gains and delays over their whole intervals.
+) -> tuple[ComplexArray, FloatArray]:
+    """Every loop with gains and delays over their whole intervals, and how likely each is.
 
-    Intermediate values are needed where a raised gain excludes the ends.
+    Intermediate values are needed where a raised gain excludes the ends: so many that the phase
+    differs little from one to the next where the loops cross 0 dB for the last time.
     """
     turn = -2j * np.pi * frequency_hz
-    rows = [
-        loops * np.exp(a + turn * d)
-        for a in np.linspace(size.low, size.high, threshold.SIZES)
-        for d in np.linspace(late_s.low, late_s.high, threshold.DELAYS)
-    ]
-    return np.concatenate(rows)
+    at = np.flatnonzero(np.any(np.abs(loops) > 1.0, axis=0))
+    last_hz = float(frequency_hz[at[-1]]) if at.size else 0.0
+    turned_deg = 360.0 * last_hz * (late_s.high - late_s.low)
+    delays = int(np.clip(np.ceil(turned_deg / threshold.APART_DEG) + 1, *threshold.DELAYS))
+    sizes, lates = (
+        each.ravel()
+        for each in np.meshgrid(
+            np.linspace(size.low, size.high, threshold.SIZES),
+            np.linspace(late_s.low, late_s.high, delays),
+            indexing="ij",
+        )
+    )
+    rows = [loops * np.exp(a + turn * d) for a, d in zip(sizes, lates, strict=True)]
+    likely = _likely(sizes, size) * _likely(lates, late_s)
+    return np.concatenate(rows), np.repeat(likely, len(loops))
 
 
 def excluding_db(
@@ -350,19 +395,27 @@ def excluding_db(
     an interval may be. A loop that is stable with more gain than returned is therefore none of
     them.
     """
-    size = Interval(*(getattr(verdict.gain_db, e) / _IN_DB for e in ("value", "low", "high")))
-    least = 0.0
-    for row in _moved(frequency_hz, loops, size, verdict.delay_s):
-        worst = worst_of(row[None, :])
-        if not worst.stable:
-            continue
-        misses = (
-            worst.phase_margin_deg < guaranteed.phase_margin_deg - WORST_DEG
-            or worst.gain_margin_db < guaranteed.gain_margin_db - WORST_DB
-            or worst.ms > guaranteed.ms * _WORST_RATIO
-        )
-        least = max(least, worst.gain_margin_db if misses else 0.0)
-    return least
+    moved, _likely_each = _moved(frequency_hz, loops, _size_of(verdict), verdict.delay_s)
+    every = each_of(moved)
+    misses = (
+        (every.phase_margin_deg < guaranteed.phase_margin_deg - WORST_DEG)
+        | (every.gain_margin_db < guaranteed.gain_margin_db - WORST_DB)
+        | (every.ms > guaranteed.ms * _WORST_RATIO)
+    )
+    return float(np.max(every.gain_margin_db[misses & every.stable], initial=0.0))
+
+
+def as_measured(
+    verdict: LoopVerdict, frequency_hz: FloatArray, nominal: ComplexArray
+) -> ComplexArray:
+    """The nominal loop [1, n] with the delay and gain that the lines of a verdict show."""
+    return _moved_once(frequency_hz, nominal, _size_of(verdict), verdict.delay_s)
+
+
+def _size_of(verdict: LoopVerdict) -> Interval:
+    """The gain of the measured lines beyond the prediction, as a logarithm."""
+    gain = verdict.gain_db
+    return Interval(gain.value / _IN_DB, gain.low / _IN_DB, gain.high / _IN_DB)
 
 
 def _moved_once(
@@ -371,6 +424,39 @@ def _moved_once(
     """The nominal loop with the gain and delay that the measured lines show."""
     moved = loop * np.exp(size.value - 2j * np.pi * frequency_hz * late_s.value)
     return np.asarray(moved)[None, :]
+
+
+def _left_of(
+    frequency_hz: FloatArray,
+    loop: ComplexArray,
+    size: Interval,
+    late_s: Interval,
+    shown_gain_db: float,
+) -> ComplexArray | None:
+    """The nominal loop as measured; where a raised gain excludes that, the mean of what it leaves.
+
+    Gain and delay are normal over their intervals. None where nothing is left.
+    """
+    once = _moved_once(frequency_hz, loop, size, late_s)
+    more = 10 ** (shown_gain_db / 20.0)
+    if bool(stable(once * more)[0]):
+        return once
+    grids = [np.linspace(each.low, each.high, threshold.LEFT_STEPS) for each in (size, late_s)]
+    sizes, delays = (each.ravel() for each in np.meshgrid(*grids))
+    turn = -2j * np.pi * frequency_hz
+    left = np.asarray(stable(loop * np.exp(sizes[:, None] + turn * delays[:, None]) * more))
+    if not np.any(left):
+        return None
+    weight = np.where(left, _likely(sizes, size) * _likely(delays, late_s), 0.0)
+    mean = [float(np.average(each, weights=weight)) for each in (sizes, delays)]
+    return np.asarray(loop * np.exp(mean[0] + turn * mean[1]))[None, :]
+
+
+def _likely(values: FloatArray, interval: Interval) -> FloatArray:
+    """Relative probability of these values, from the larger half of a 95 % interval."""
+    half = max(interval.high - interval.value, interval.value - interval.low, 1e-12)
+    std = half / _CI95
+    return np.asarray(np.exp(-0.5 * ((values - interval.value) / std) ** 2))
 
 
 def _beyond(

@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 
+from backend.analysis.loop.mode_above import ModeAbove
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
@@ -94,12 +95,13 @@ def measured_plant(
     lines: int = 400,
     variants: tuple[MechanicalModel, ...] = (),
     fitted: bool = True,
+    above: tuple[ModeAbove, ...] = (),
 ) -> MeasuredPlant:
     """Combine a corrected measurement with its model.
 
     With ``fitted``, the model was fitted to all lines: next to each line it is weighted by the
     accuracy of that line. Otherwise a line hidden by friction or noise would determine a design by
-    its error.
+    its error. Each mode of ``above`` is one more axis that this may be.
 
     The ratio measurement/model is smooth, so it may be interpolated between lines where the
     response itself may not; outside the measured band it fades to 1 within a third of an octave.
@@ -108,6 +110,7 @@ def measured_plant(
     f = frf.frequency_hz[use]
     grid = [np.geomspace(1.0, highest_hz, lines)]
     special = [m.frequency_hz for m in model.modes] + [a[0] for a in model.antiresonances()]
+    special += [m.frequency_hz for m in above]
     grid += [np.geomspace(0.85 * x, 1.18 * x, 60) for x in special if 1.0 < x < highest_hz / 1.2]
     dense = np.unique(np.concatenate(grid))
     if f.size < 2:
@@ -120,7 +123,11 @@ def measured_plant(
     fade = np.concatenate([[0.0], log_ratio, [0.0]])
     x, xp = np.log(dense), np.log(fade_f)
     joined = np.interp(x, xp, fade.real) + 1j * np.interp(x, xp, fade.imag)
-    return MeasuredPlant(dense, np.exp(joined), model, float(f[-1]), variants)
+    plant = MeasuredPlant(dense, np.exp(joined), model, float(f[-1]), variants)
+    if not above:
+        return plant
+    response = plant.response()
+    return replace(plant, also=np.array([each.extended(dense, response) for each in above]))
 
 
 def _own_share(frf: Frf) -> FloatArray:

@@ -45,7 +45,8 @@ async def first_kept(
 
     ``candidates`` are tried in their order. ``guaranteed`` are the requested goals; a more careful
     candidate that misses its own goals may still meet them. A candidate whose only fault is torque
-    ripple is tried again with less gain, made by ``softer``, before a slower one is tried. When
+    ripple, or that no raised gain can show to be sound, is tried again with less gain, made by
+    ``softer``, before a slower one is tried. When
     ``time_left`` allows only one more verification, the most careful (last) candidate is used for
     it.
 
@@ -96,17 +97,21 @@ async def first_kept(
             if verified.why is not None:
                 tried.append(verified.why)
             await take_back(axis, before)
-        if (
-            softer is not None
-            and verified.hum_percent is not None
-            and softened < threshold.SOFTENED
-        ):
+        share = _softer_share(verified)
+        if softer is not None and share is not None and softened < threshold.SOFTENED:
             softened += 1
-            # The torque ripple that sensor noise causes is proportional to the gain.
-            less = await softer(candidate, threshold.QUIETER * HUM_PERCENT / verified.hum_percent)
+            less = await softer(candidate, share)
             if less is not None:
                 waiting = _in_turn(waiting, candidate, less)
     return None
+
+
+def _softer_share(verified: Verified) -> float | None:
+    """Share of a failed design's gains with which it would be kept; None where it is not known."""
+    if verified.hum_percent is not None:
+        # The torque ripple that sensor noise causes is proportional to the gain.
+        return threshold.QUIETER * HUM_PERCENT / verified.hum_percent
+    return verified.share_to_show
 
 
 def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -> list[Candidate]:

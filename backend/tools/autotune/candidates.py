@@ -11,6 +11,7 @@ from backend.analysis.loop.design import Candidate, design
 from backend.analysis.loop.loop_goals import LoadClass
 from backend.analysis.loop.loop_structure import DriveLoops
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
+from backend.analysis.loop.mode_above import modes_above
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
@@ -159,7 +160,8 @@ def cautious_plant(
 
     It consists of the coherent lines of the direct estimate and a rigid axis above and below them.
     A variant has the lowest inertia possible: the motor alone, as within a backlash, or, where that
-    inertia is unknown, the lowest that the measured lines show.
+    inertia is unknown, the lowest that the measured lines show. Where the last lines are those of a
+    spring, the resonance that follows above them belongs to it.
     """
     frf = mechanics.direct
     use = frf.in_band & (frf.coherence > threshold.COHERENT)
@@ -173,7 +175,8 @@ def cautious_plant(
         lightest = motor_inertia_kgm2
     rigid = MechanicalModel(1.0 / inertia_kgm2, 1e-3)
     variants = (MechanicalModel(1.0 / lightest, 1e-3),)
-    return measured_plant(frf, rigid, variants=variants, fitted=False)
+    above = modes_above(frf, threshold.COHERENT)
+    return measured_plant(frf, rigid, variants=variants, fitted=False, above=above)
 
 
 async def plan(

@@ -8,7 +8,7 @@ stable with a raised gain has at least that gain margin, at whatever frequency i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +18,10 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.autotune import gains as gain_tool
-from backend.tools.autotune.axis_facts import si_value
+from backend.tools.autotune.axis_facts import AxisFacts, si_value
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import temporary
+from backend.tools.moves.go_back import go_back
 from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
 from backend.tools.step.run import step_response
 from backend.tools.thresholds import autotune_gain_steps as threshold
@@ -58,6 +59,7 @@ async def gain_steps(
     progress: Progress,
     keep: Keep | None = None,
     *,
+    facts: AxisFacts,
     surely_db: float = 0.0,
 ) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
@@ -65,6 +67,9 @@ async def gain_steps(
     Up to ``surely_db`` every loop that the axis may have is stable: fewer steps lead there.
     ``present`` is the same step at the unchanged gain. A step of which too many samples were lost
     shows nothing: no gain is raised further then.
+
+    A slow loop takes longer to return than to step. Steps therefore lead away and back in turn,
+    each compared with one of the same direction at the unchanged gain.
 
     Raises:
         DriveError: the drive has a fault, or the link is lost; an oscillation is not an error.
@@ -76,6 +81,10 @@ async def gain_steps(
     parameter = drive.parameter(key)
     now = await drive.raw(key)
     value = si_value(parameter, float(parameter.to_value(now)))
+    home, envelope = await axis.position_raw(), settings.envelope
+    directions = {False: settings, True: replace(settings, size=-settings.size)}
+    unchanged = {False: present}
+    away = moved = False
     done: list[GainStep] = []
     levels = levels_to(wanted_db, surely_db)
     for db in levels:
@@ -87,22 +96,43 @@ async def gain_steps(
         if done and real_db < done[-1].gain_db + 0.1:
             break
         progress(len(done) / len(levels), text("autotune.db-more-gain", real_db=real_db))
+        back, silent = away, Progress(lambda: None)
         async with temporary(axis, {key: raw}):
             try:
-                step = await step_response(axis, session, settings, Progress(lambda: None), keep)
+                step = await step_response(axis, session, directions[back], silent, keep, True)
             except DriveError as error:
                 if await ends_all(axis, error):
                     raise
                 done.append(GainStep(real_db, float("inf"), False))
+                moved = False
                 break
+        away, moved = not back, True
         if not received(step, settings):
             break
-        done.append(judged(step, present, settings, real_db))
-        if not done[-1].stable:
+        done.append(judged(step, unchanged[back], settings, real_db))
+        if not done[-1].stable or len(done) == len(levels):
             break
+        if True not in unchanged:
+            unchanged[True] = await step_response(
+                axis, session, directions[True], silent, keep, True
+            )
+            away = False
+            if not received(unchanged[True], settings):
+                break
+        if not away and await _elsewhere(axis, home, settings):
+            await go_back(axis, session, home, envelope, facts)
+    if moved:
+        await go_back(axis, session, home, envelope, facts)
     shown = [each.gain_db for each in done if each.stable]
     onset = next((each.gain_db for each in done if not each.stable), None)
     return GainSteps(max(shown, default=0.0), onset, tuple(done))
+
+
+async def _elsewhere(axis: Axis, home_raw: int, settings: StepSettings) -> bool:
+    """Whether the axis came back too far from where its steps begin to compare their torques."""
+    off_rev = (await axis.units()).position(await axis.position_raw() - home_raw)
+    way_rev = settings.size / 60.0 * settings.hold_s
+    return abs(off_rev) > threshold.BACK * abs(way_rev)
 
 
 def levels_to(wanted_db: float, surely_db: float = 0.0) -> list[float]:

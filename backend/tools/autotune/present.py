@@ -192,13 +192,7 @@ class Trials:
 
     async def _designs(self, rows: Sequence[Candidate], plant: MeasuredPlant) -> Applied | None:
         async def softer(candidate: Candidate, share: float) -> Candidate | None:
-            g = candidate.gains
-            gains = Gains(
-                share * g.speed_nms,
-                share * g.integral_hz,
-                share * g.position_1_s,
-                share * g.speed_bandwidth_hz,
-            )
+            gains = candidate.gains.times(share)
             made, sound = await asyncio.to_thread(
                 judged, self.axis, self.check.facts, plant, gains, candidate.notches,
                 candidate.filters, self.guaranteed,

@@ -354,7 +354,7 @@ async def apply_and_verify(
     check = Check(
         settings.envelope, facts, inertia, found.mechanics.hold, settings.rated_torque_nm,
         settings.motor_inertia_kgm2, found.inertia.result.coulomb_nm.value,
-        await axis.position_raw(),
+        await axis.position_raw(), speed_dropped=found.mechanics.speed_dropped,
     )  # fmt: skip
     guaranteed = goals_for(found.load, settings.mark)
     clock = time_left or TimeLeft()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from backend.analysis.loop.design import Candidate
@@ -138,7 +140,34 @@ def verdict_of(
     hold: Hold | None,
     shown_gain_db: float | None = None,
 ) -> LoopVerdict:
-    """Verdict on this design's loop; the worst one over the possible paths of its reference.
+    """Verdict on this design's loop; the worst one of `verdicts_of`.
+
+    Raises:
+        NotAllowed, ValueError: a part of the loop has no known meaning.
+    """
+    found = verdicts_of(axis, facts, plant, candidate, frf, hold, shown_gain_db)
+    return worst_of_paths(found)
+
+
+def worst_of_paths(found: Sequence[LoopVerdict]) -> LoopVerdict:
+    """The worst verdict over the possible paths of a reference.
+
+    A path with which no loop is stable with the gain that was raised is not the reference's.
+    """
+    possible = [each for each in found if not each.contradicted] or found
+    return min(possible, key=lambda v: v.stated.phase_margin_deg)
+
+
+def verdicts_of(
+    axis: Axis,
+    facts: AxisFacts,
+    plant: MeasuredPlant,
+    candidate: Candidate,
+    frf: Frf,
+    hold: Hold | None,
+    shown_gain_db: float | None = None,
+) -> tuple[LoopVerdict, ...]:
+    """Verdicts on this design's loop, one for each possible path of its reference.
 
     Raises:
         NotAllowed, ValueError: a part of the loop has no known meaning.
@@ -174,7 +203,7 @@ def verdict_of(
     # sharp ones, without gaps between them.
     shown = _lines(frf, threshold.SHOWN_DEG)
     if shown is None:
-        return judged(None, None)
+        return (judged(None, None),)
     f = shown.frequency_hz
     expected = loops(f, plant.on(f).response())
     paths = reference_paths(
@@ -192,7 +221,7 @@ def verdict_of(
         if np.count_nonzero(clear) >= LINES:
             lines = _up_to_gap(Lines(f[clear], path.closed[clear], shown.deviation[clear]))
         found.append(judged(lines, path))
-    return min(found, key=lambda v: v.stated.phase_margin_deg)
+    return tuple(found)
 
 
 def in_words(missed: tuple[Missed, ...]) -> list[Text]:

@@ -22,7 +22,13 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.autotune.gain_steps import GainSteps, gain_steps, steps_to
-from backend.tools.autotune.raising import by_raised_gain, not_shown, raised_to, surely_db
+from backend.tools.autotune.raising import (
+    by_raised_gain,
+    not_shown,
+    raised_to,
+    share_to_show,
+    surely_db,
+)
 from backend.tools.autotune.reference import reference_for
 from backend.tools.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.autotune.verdict import (
@@ -37,7 +43,8 @@ from backend.tools.autotune.verdict import (
     pieces,
     sharp,
     sharp_lines,
-    verdict_of,
+    verdicts_of,
+    worst_of_paths,
 )
 from backend.tools.inertia.probe import holding_torque
 from backend.tools.measuring.recording import quiet
@@ -76,6 +83,8 @@ class Verified:
     """Response over all realisations of the repeated measurement; None if not repeated."""
     verdict: LoopVerdict | None = None
     """Margins and the band they are known in; None without a plant to predict from."""
+    share_to_show: float | None = None
+    """Share of the gains with which a raised gain would show the margins, where it cannot."""
     shown: GainSteps | None = None
     """Result of raising the gain, where the measured band does not reach the last crossover."""
 
@@ -100,6 +109,8 @@ class Check:
     """Position where each verification begins, wherever the one before ended."""
     pairs_before: int = 0
     """Realisations that the prediction was derived from; they must not be used to verify it."""
+    speed_dropped: bool = False
+    """Whether the reported speed contradicts the position, which shows the loop then."""
     plant: MeasuredPlant | None = None
     """Plant that the design was made for; unmeasured parts of the loop are predicted from it."""
 
@@ -142,6 +153,7 @@ async def verify(
         coulomb_nm=check.coulomb_nm,
         reference_rad_s=reference.peak_rad_s if reference else None,
         reference_corner_hz=reference.corner_hz if reference else None,
+        speed_dropped=check.speed_dropped,
     )
     clock = time_left or TimeLeft()
     begun_s = time.monotonic()
@@ -151,11 +163,13 @@ async def verify(
     # A further verification of a redesign is worth more than a longer measurement of this loop.
     looks = LOOKS - bool(check.pairs_before) if read else 0
     took_s = time.monotonic() - begun_s
-    verdict = _verdict(axis, check, candidate, swept, None)
+    judged = swept
+    verdicts = _verdicts(axis, check, candidate, judged, None)
+    verdict = _worst(verdicts)
     above = tuple(each for each in _misses(verdict, guaranteed) if by_raised_gain(each))
     known = (axis, check.facts, check.plant, candidate)
-    raised_db = raised_to(*known, verdict, guaranteed, above) if above else 0.0
-    clock.require_raising(steps_to(raised_db, surely_db(*known, verdict)) if above else 0)
+    raised_db = raised_to(*known, verdicts, guaranteed, above) if above else None
+    clock.require_raising(steps_to(raised_db, surely_db(*known, verdicts)) if raised_db else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(guaranteed, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
@@ -169,14 +183,22 @@ async def verify(
         every = more.frf
         missed = worse_than(guaranteed, sharp_margins(more))
         if blurred and sharp_lines(more.frf) is not None:
-            verdict = _verdict(axis, check, candidate, more, None)
+            judged = more
+            verdicts = _verdicts(axis, check, candidate, judged, None)
+            verdict = _worst(verdicts)
         swept, read = _joined(swept, read, more)
     if again.left_out:
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
     beyond = _misses(verdict, guaranteed)
     open_above = tuple(each for each in beyond if by_raised_gain(each))
+    raised_db = raised_to(*known, verdicts, guaranteed, open_above) if open_above else None
     missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
+    share: float | None = None
+    if open_above and raised_db is None and not missed:
+        # No gain that may be tried shows it.
+        missed = in_words(open_above)
+        share = share_to_show(*known, verdicts, guaranteed, open_above)
     why = _named(candidate, missed)
     shown: GainSteps | None = None
     step: step_evaluation.StepResult | None = None
@@ -197,39 +219,45 @@ async def verify(
         hums, restless_why = hum(step), None if read else restless(step)
         why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
         only_hums = hums is not None and restless_why is None
-        if why is None and open_above:
-            most_db = raised_to(*known, verdict, guaranteed, open_above)
+        if why is None and raised_db is not None:
             # A raised gain takes more torque in the same step; at its limit it shows nothing.
-            share = bearable(check, step, most_db)
-            if share < 1.0 and len(steps) > 1 and bearable(check, steps[0], most_db) >= 1.0:
-                settings_of_step, present, share = usual, steps[0], 1.0
-            if share < 1.0:
-                settings_of_step = replace(settings_of_step, size=share * settings_of_step.size)
+            size = bearable(check, step, raised_db)
+            if size < 1.0 and len(steps) > 1 and bearable(check, steps[0], raised_db) >= 1.0:
+                settings_of_step, present, size = usual, steps[0], 1.0
+            if size < 1.0:
+                settings_of_step = replace(settings_of_step, size=size * settings_of_step.size)
                 present = await step_response(axis, session, settings_of_step, stepping, keep)
             shown = await gain_steps(
-                axis, session, settings_of_step, present, most_db, stepping,
-                surely_db=surely_db(*known, verdict),
+                axis, session, settings_of_step, present, raised_db, stepping,
+                facts=check.facts,
+                surely_db=surely_db(*known, verdicts),
             )  # fmt: skip
-            verdict = _verdict(axis, check, candidate, swept, shown.shown_db)
+            verdict = _worst(_verdicts(axis, check, candidate, judged, shown.shown_db))
             why = _named(candidate, not_shown(verdict, guaranteed, shown, open_above))
     swept = replace(swept, margins=read)
     return Verified(
         swept, step, guaranteed, candidate.bandwidth_hz, measured, why is None, why,
-        hum_percent_of(step) if step is not None and only_hums else None, every, verdict, shown,
+        hum_percent_of(step) if step is not None and only_hums else None, every, verdict, share,
+        shown,
     )  # fmt: skip
 
 
-def _verdict(
+def _worst(verdicts: Sequence[LoopVerdict]) -> LoopVerdict | None:
+    """The worst verdict over the possible paths; None where there is none."""
+    return worst_of_paths(verdicts) if verdicts else None
+
+
+def _verdicts(
     axis: Axis,
     check: Check,
     candidate: Candidate,
     swept: sweep_evaluation.SweepResult,
     shown_db: float | None,
-) -> LoopVerdict | None:
-    """Verdict on the measured loop; None where there is no plant to predict from."""
+) -> tuple[LoopVerdict, ...]:
+    """Verdicts on the measured loop; none where there is no plant to predict from."""
     if check.plant is None:
-        return None
-    return verdict_of(axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db)
+        return ()
+    return verdicts_of(axis, check.facts, check.plant, candidate, swept.frf, check.hold, shown_db)
 
 
 def _misses(verdict: LoopVerdict | None, guaranteed: Goals) -> tuple[Missed, ...]:

@@ -46,8 +46,11 @@ async def step_response(
     settings: StepSettings,
     progress: Progress,
     keep: Keep | None = None,
+    stays: bool = False,
 ) -> StepResult:
     """Play the step and read the figures; the axis ends where it began.
+
+    With ``stays`` a step of speed ends where the axis has come to rest: the next one leads back.
 
     Raises:
         OutOfRange: the step exceeds the envelope; nothing has moved.
@@ -80,7 +83,8 @@ async def step_response(
     # First of all, so that the measurement is not lost if the way back fails.
     if keep is not None:
         keep("step", *raw_of(recording, demand, settings, facts))
-    await go_back(axis, session, home, settings.envelope, facts)
+    if not stays:
+        await go_back(axis, session, home, settings.envelope, facts)
     return evaluate(recording, demand, settings, facts.rated_torque_nm)
 
 

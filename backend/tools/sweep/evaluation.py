@@ -25,6 +25,7 @@ from backend.analysis.response.reported import (
     path_uncertainty,
     slow_uncertainty,
 )
+from backend.analysis.response.reported_speed import with_position_speed
 from backend.analysis.response.sampling import (
     MODEL_SHARE,
     Hold,
@@ -92,6 +93,8 @@ class SweepSettings:
     """For a speed loop's response: peak of the reference; None: by the inertia."""
     reference_corner_hz: float | None = None
     """For a speed loop's response: above it the lines of the reference fall; None: 40 Hz."""
+    speed_dropped: bool = False
+    """For a speed loop's response: the reported speed contradicts the position, which is used."""
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,8 @@ class SweepResult:
     speed_filter_hz: float | None = None
     hold: Hold | None = None
     """How setpoints are held between cycles, as the drive reports or the recording showed."""
+    speed_dropped: bool = False
+    """Whether the reported speed contradicts the position; only the latter was used then."""
     detected: Detected | None = None
     """Noise and distortion on the lines that were left empty, where there were any."""
     load: LoadSide | None = None
@@ -288,6 +293,7 @@ def _mechanics(
         # What is no filter of first order has no corner of one.
         speed_filter_hz=None if found.speed_dropped else path.response_bandwidth_hz,
         hold=path.hold,
+        speed_dropped=found.speed_dropped,
         detected=found.distortion.detected if found.distortion is not None else None,
     )
 
@@ -478,11 +484,11 @@ def _evaluate_loop(
             taken.append(Record(s.excitation, moved, None, r.valid))
         coulomb_nm: float | None = 0.0
     else:
-        for s, r in records:
-            taken.append(
-                Record(s.excitation, r.velocity_rad_s, r.torque_nm, r.valid, r.position_rad)
-            )
+        taken += _taken(records)
         coulomb_nm = settings.coulomb_nm
+        if settings.speed_dropped:
+            taken = [with_position_speed(record) for record in taken]
+            path = replace(path, response_bandwidth_hz=None)
     # The drive reads the reference at the beginning of its step, and the mean torque follows half a
     # step later, as does the speed: both belong to the loop (`loops_of`), not to the input path.
     path = replace(path, command_delay_s=path.command_delay_s - path.loop_delay_s)

@@ -207,3 +207,38 @@ def test_a_demand_beside_a_loop_passes_the_current_loop_too(demand, known_hz):
     assert e.covered > 0.9
     assert e.magnitude_db < 0.2
     assert e.phase_deg < 1.5
+
+
+@pytest.mark.parametrize("dropped", [False, True])
+def test_a_loop_whose_speed_contradicts_its_position_is_that_of_the_position(dropped):
+    """A loop of first order, 60 Hz, beside a reported speed that is late by 1 ms at 1 kHz."""
+    period, corner_hz = 750, 60.0
+    lines = choose_lines(5.0, 240.0, RATE / period, count=100)
+    a = float(np.exp(-TURN * corner_hz / (FINER * RATE)))
+    records = []
+    for i in range(2):
+        e = multisine(
+            sample_rate_hz=RATE, period_samples=period, lines=lines, realisation=0,
+            invert=bool(i % 2), integrations=0, iterations=20, ramp_samples=period // 8,
+        )  # fmt: skip
+        fine = lfilter([1.0 - a], [1.0, -a], np.repeat(e.samples, FINER))
+        place = np.cumsum(fine) / (FINER * RATE)
+        nothing = np.zeros(e.samples.size)
+        reported = _late_mean(fine)[::FINER]
+        valid = np.ones(e.samples.size, np.bool_)
+        recording = Recording(RATE, place[::FINER], reported, nothing, e.samples, nothing, valid)
+        records.append((excite.Sequence(e), recording))
+    settings = SweepSettings(
+        Envelope(4.0, 1500.0, 100.0, 60.0), kind="speed_loop", hold="zero", coulomb_nm=0.0,
+        speed_dropped=dropped,
+    )  # fmt: skip
+    facts = AxisFacts(1.27, True, 3000.0, 1000.0, None, None, None, False)
+    frf = evaluate(tuple(records), RATE, facts, settings, "speed", True).frf
+    use = frf.in_band & (frf.frequency_hz > 20.0)
+    f = frf.frequency_hz[use]
+    ratio = frf.response[use] * (1.0 + 1j * f / corner_hz)
+    off_db = float(np.max(np.abs(20 * np.log10(np.abs(ratio)))))
+    if dropped:
+        assert off_db < 0.3
+    else:
+        assert off_db > 1.0

@@ -52,13 +52,24 @@ async def raised(
         raised=lambda _drive, _key, now, factor: round(now * factor),
     )
     monkeypatch.setattr(raising, "step_response", again)
+
+    async def home() -> int:
+        return 0
+
+    async def go_back(*_: Any) -> None:
+        pass
+
+    async def units() -> Any:
+        return SimpleNamespace(position=float)
+
+    monkeypatch.setattr(raising, "go_back", go_back)
     monkeypatch.setattr(raising, "temporary", temporary)
     monkeypatch.setattr(raising, "gain_tool", tool)
     parameter = SimpleNamespace(unit="Hz", to_value=float)
     drive = SimpleNamespace(parameter=lambda _key: parameter, raw=raw)
-    axis: Any = SimpleNamespace(drive=drive)
+    axis: Any = SimpleNamespace(drive=drive, position_raw=home, units=units)
     silent = Progress(lambda: None)
-    return await raising.gain_steps(axis, NOTHING, SETTINGS, present, 6.0, silent)
+    return await raising.gain_steps(axis, NOTHING, SETTINGS, present, 6.0, silent, facts=NOTHING)
 
 
 async def test_an_oscillation_that_was_not_received_shows_no_gain(
@@ -76,3 +87,68 @@ async def test_single_samples_are_not_missed(monkeypatch: pytest.MonkeyPatch) ->
     found = await raised(monkeypatch, step(0.1, 0.0), step(0.1, 0.003))
     assert found.shown_db == pytest.approx(6.0, abs=0.1)
     assert found.onset_db is None
+
+
+async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is compared with one of its direction; the last way leads home at the usual gain."""
+    place, returned, gains, stepped = 0.0, [], [1.0], []
+    ways = {1: 0.4, -1: -0.38}
+
+    async def again(_axis: Any, _session: Any, settings: StepSettings, *rest: Any) -> StepResult:
+        nonlocal place
+        sign = int(np.sign(settings.size))
+        stepped.append((sign, round(gains[-1], 2)))
+        place += ways[sign]
+        assert rest[-1] is True
+        return step(0.1, 0.0)
+
+    async def home(*_: Any) -> None:
+        nonlocal place
+        returned.append((len(stepped), gains[-1]))
+        place = 0.0
+
+    @asynccontextmanager
+    async def temporary(_axis: Any, values: dict[str, int]) -> AsyncIterator[None]:
+        gains.append(values["gain"] / 100)
+        yield
+        gains.append(1.0)
+
+    async def position_raw() -> int:
+        return round(1000 * place)
+
+    async def units() -> Any:
+        return SimpleNamespace(position=lambda raw: raw / 1000)
+
+    async def raw(_key: str) -> int:
+        return 100
+
+    tool: Any = SimpleNamespace(
+        spec_of=lambda _drive: SimpleNamespace(speed="gain"),
+        raised=lambda _drive, _key, now, factor: round(now * factor),
+    )
+    for name, value in (
+        ("step_response", again), ("go_back", home), ("temporary", temporary),
+        ("gain_tool", tool),
+    ):  # fmt: skip
+        monkeypatch.setattr(raising, name, value)
+    drive = SimpleNamespace(
+        parameter=lambda _key: SimpleNamespace(unit="Hz", to_value=float), raw=raw
+    )
+    axis: Any = SimpleNamespace(drive=drive, position_raw=position_raw, units=units)
+    silent = Progress(lambda: None)
+    found = await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING
+    )
+    assert found.shown_db == pytest.approx(10.0, abs=0.1)
+    assert [sign for sign, _gain in stepped] == [1, -1, 1, -1, 1]
+    assert stepped[1] == (-1, 1.0)
+    assert all(gain > 1.0 for number, (_sign, gain) in enumerate(stepped) if number != 1)
+    # Twice 0.02 rev beside the way of 0.42 rev is near enough; what remains is gone at the end.
+    assert returned == [(5, 1.0)]
+    assert place == 0.0
+    # A loop that hardly moves back begins again where it began.
+    ways[-1], place = -0.1, 0.0
+    stepped.clear()
+    returned.clear()
+    await raising.gain_steps(axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING)
+    assert [number for number, _gain in returned] == [2, 4, 5]

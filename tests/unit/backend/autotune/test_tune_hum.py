@@ -41,6 +41,7 @@ async def kept_of(
     soft: bool = True,
     time_left: TimeLeft | None = None,
     meanwhile: Callable[[], None] = lambda: None,
+    shown_nms: float | None = None,
 ) -> tuple[list[float], float | None]:
     """The speed gains that were verified, in turn, and the one that stayed."""
     seen: list[float] = []
@@ -49,9 +50,12 @@ async def kept_of(
         gain = candidate.gains.speed_nms
         seen.append(gain)
         meanwhile()
-        kept = gain <= QUIET_NMS
-        hum = None if kept else 4.0 * gain / QUIET_NMS
-        return SimpleNamespace(kept=kept, why=None if kept else HUMS, hum_percent=hum)
+        kept = gain <= (shown_nms or QUIET_NMS)
+        hum = None if kept or shown_nms else 4.0 * gain / QUIET_NMS
+        share = None if kept or not shown_nms else 0.84
+        return SimpleNamespace(
+            kept=kept, why=None if kept else HUMS, hum_percent=hum, share_to_show=share
+        )
 
     async def softer(candidate: Candidate, share: float) -> Candidate | None:
         gains = replace(candidate.gains, speed_nms=share * candidate.gains.speed_nms)
@@ -123,3 +127,13 @@ async def test_a_design_that_the_drive_holds_with_more_gain_only_is_left_out_and
     assert found is None
     assert [each.code for each in tried] == ["autotune.candidate"] * len(rows)
     assert "2 times the designed gain" in tried[0].words()
+
+
+async def test_what_no_raised_gain_shows_is_tried_with_the_share_that_it_needs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Before designs that are slower than that, and instead of those that are not."""
+    rows = [design(10.0), design(9.0), design(2.0)]
+    seen, kept = await kept_of(monkeypatch, rows, shown_nms=8.5)
+    assert kept == pytest.approx(8.4)
+    assert seen == [10.0, pytest.approx(8.4)]
