@@ -66,7 +66,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ): _PYSERIAL,
     ("drivers/modbus/port.py", 'if number == errno.EINVAL or "baud" in text:'): _PYSERIAL,
     (
-        "drivers/canopen/adapter.py",
+        "drivers/canopen/adapters/adapter.py",
         'if code == errno.EAFNOSUPPORT or "AF_CAN" in words:',
     ): "Python without SocketCAN raises AttributeError or OSError without a number",
     (

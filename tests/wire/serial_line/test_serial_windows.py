@@ -9,7 +9,7 @@ import can
 import pytest
 import serial
 
-from drivers.canopen.adapter import translate
+from drivers.canopen.adapters.adapter import translate
 from drivers.canopen.url import parse_canopen_url
 from drivers.computer import terminals
 from drivers.computer.terminals import is_in_use, may_open, port_errno

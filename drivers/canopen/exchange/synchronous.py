@@ -14,8 +14,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from drivers.canopen.exchange.images import Images, Key
 from drivers.canopen.frames import HEARTBEAT, SYNC, Frame
-from drivers.canopen.images import Images, Key
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, LinkTimeout
 from drivers.halt import HaltCause, Halted

@@ -15,7 +15,7 @@ from contextlib import suppress
 from queue import Empty, SimpleQueue
 from typing import NoReturn, TypeVar
 
-from drivers.canopen import sdo
+from drivers.canopen.sdo import transfers as sdo
 from drivers.errors import DriveError, LinkTimeout, NotAsked, Rejected
 
 T = TypeVar("T")
@@ -76,7 +76,7 @@ class SdoChannel:
             LinkTimeout: no answer within ``timeout_s`` of a request; the server was sent an abort.
                 NotAsked if it had not answered before either; then nothing was requested.
             LinkLost: the bus went down meanwhile.
-            Rejected, ProtocolError: see `drivers.canopen.sdo`.
+            Rejected, ProtocolError: see `drivers.canopen.sdo.transfers`.
         """
         with self._turn:
             if self._unanswered:

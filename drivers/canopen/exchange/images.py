@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers import cia402
-from drivers.canopen.pdo import PdoPlan
+from drivers.canopen.exchange.pdo import PdoPlan
 from drivers.codec import decode, encode, size_of
 from drivers.halt import Halted
 from drivers.motion.playback import AxisLoop

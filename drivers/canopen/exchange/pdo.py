@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
-from drivers.canopen.busload import LIMIT, BusLoad, bus_load, require_room
-from drivers.canopen.fixed_pdo import FixedPdo, chosen
+from drivers.canopen.exchange.busload import LIMIT, BusLoad, bus_load, require_room
+from drivers.canopen.exchange.fixed_pdo import FixedPdo, chosen
 from drivers.canopen.frames import RPDO, TPDO
 from drivers.codec import size_of
 from drivers.link import CyclicSignal

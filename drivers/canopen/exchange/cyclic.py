@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from drivers.canopen import frames
-from drivers.canopen.busload import BusLoad
-from drivers.canopen.drive_setup import DriveSetup, ReadObject, WriteObject
-from drivers.canopen.fixed_pdo import FixedPdo
+from drivers.canopen.adapters.port import CanPort
+from drivers.canopen.exchange.busload import BusLoad
+from drivers.canopen.exchange.drive_setup import DriveSetup, ReadObject, WriteObject
+from drivers.canopen.exchange.fixed_pdo import FixedPdo
+from drivers.canopen.exchange.images import CONTROL_WORD, Images
+from drivers.canopen.exchange.pdo import PdoPlan, plan_within_load
+from drivers.canopen.exchange.synchronous import LoopClock, SyncLoop
+from drivers.canopen.exchange.trajectory import motion_of
 from drivers.canopen.frames import Frame
-from drivers.canopen.images import CONTROL_WORD, Images
-from drivers.canopen.pdo import PdoPlan, plan_within_load
-from drivers.canopen.port import CanPort
-from drivers.canopen.sdo import fitted
-from drivers.canopen.synchronous import LoopClock, SyncLoop
-from drivers.canopen.trajectory import motion_of
+from drivers.canopen.sdo.transfers import fitted
 from drivers.canopen.url import CanUrl
 from drivers.cia402 import Dialect, Mode, State
 from drivers.errors import DriveError, LinkLost, NotAllowed

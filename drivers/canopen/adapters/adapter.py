@@ -9,7 +9,7 @@ import can
 import serial
 
 from drivers.adapters import require_channel, serial_device
-from drivers.canopen.slcan import AdapterBlocked, AdapterLost, SlcanBus
+from drivers.canopen.adapters.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
 from drivers.computer.terminals import deliver_soon, port_errno
 from drivers.errors import DriveError, LinkLost

@@ -8,14 +8,14 @@ from collections.abc import Callable
 
 import can
 
-from drivers.canopen.adapter import ADAPTER_ERRORS, open_bus, translate
-from drivers.canopen.frames import Frame
-from drivers.canopen.slcan import (
+from drivers.canopen.adapters.adapter import ADAPTER_ERRORS, open_bus, translate
+from drivers.canopen.adapters.slcan import (
     ERROR_ACKNOWLEDGE,
     ERROR_BUS_OFF,
     ERROR_CONTROLLER,
     ERROR_PROTOCOL,
 )
+from drivers.canopen.frames import Frame
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost
 from drivers.flight.kinds import can_data, can_ring

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 
-from drivers.canopen.fixed_pdo import PDOS, FixedPdo
+from drivers.canopen.exchange.fixed_pdo import PDOS, FixedPdo
+from drivers.canopen.exchange.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
 from drivers.canopen.frames import TPDO
-from drivers.canopen.pdo import INVALID, SYNCHRONOUS, PdoPlan, SdoWrite, set_up
-from drivers.canopen.sdo import fitted
+from drivers.canopen.sdo.transfers import fitted
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.motion.interpolation import interpolation_period
 from drivers.texts.message import Text, joined, text

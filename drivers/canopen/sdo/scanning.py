@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from drivers.canopen.channel import SdoChannel
+from drivers.canopen.sdo.channel import SdoChannel
 from drivers.codec import serial_or_none, text_of
 from drivers.errors import DriveError, LinkLost
 from drivers.link import Found
