@@ -20,7 +20,7 @@ import pytest
 from typer.testing import CliRunner
 
 from backend import cli
-from backend.analysis.mechanics.inertia import InertiaResult, Interval
+from backend.analysis.mechanics.slow_moves.inertia import InertiaResult, Interval
 from backend.api.app import make_app
 from backend.api.audit.audited import REPORTED_THERE
 from backend.api.security.rights import ROUTES

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.mechanics.position_torque import (
+from backend.analysis.mechanics.slow_moves.position_torque import (
     COGGING_RAD,
     Smooth,
     find_period,

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.response.local_polynomial import smooth_residual
-from backend.analysis.response.modes_found import FoundMode
-from backend.analysis.response.product_model import ProductModel, jacobian
+from backend.analysis.response.foreign_recordings.local_polynomial import smooth_residual
+from backend.analysis.response.foreign_recordings.modes_found import FoundMode
+from backend.analysis.response.foreign_recordings.product_model import ProductModel, jacobian
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.thresholds import repeat_band as threshold
 

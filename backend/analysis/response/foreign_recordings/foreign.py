@@ -7,16 +7,20 @@ from typing import Literal
 
 import numpy as np
 
-from backend.analysis.response.excitation_found import (
+from backend.analysis.response.foreign_recordings.excitation_found import (
     Excited,
     excited_lines,
     find_excitation,
     transient_periods,
 )
-from backend.analysis.response.local_polynomial import local_polynomial
-from backend.analysis.response.modes_found import FoundMode, modes_of
-from backend.analysis.response.product_model import ProductFit, fit_product
-from backend.analysis.response.repeat_band import RepeatBand, line_scatter, repeat_band
+from backend.analysis.response.foreign_recordings.local_polynomial import local_polynomial
+from backend.analysis.response.foreign_recordings.modes_found import FoundMode, modes_of
+from backend.analysis.response.foreign_recordings.product_model import ProductFit, fit_product
+from backend.analysis.response.foreign_recordings.repeat_band import (
+    RepeatBand,
+    line_scatter,
+    repeat_band,
+)
 from backend.analysis.signals.arrays import (
     BoolArray,
     ComplexArray,

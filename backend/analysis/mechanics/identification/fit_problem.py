@@ -19,6 +19,7 @@ from backend.analysis.mechanics.chain_model import (
     loads_of,
     model_of_chain,
 )
+from backend.analysis.mechanics.identification.robust_fit import minimise
 from backend.analysis.mechanics.mechanical_model import (
     MODE_PARAMETERS,
     RIGID_PARAMETERS,
@@ -27,10 +28,9 @@ from backend.analysis.mechanics.mechanical_model import (
     model_of,
     response_and_slopes,
 )
-from backend.analysis.mechanics.robust_fit import minimise
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampled_model import LoopModel, Sampler
-from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.response.signal_path.sampled_model import LoopModel, Sampler
+from backend.analysis.response.signal_path.sampling import SignalPath, delay_response, lag_response
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import fit_problem as threshold
 

@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
-from backend.analysis.response.foreign import ForeignResponse
+from backend.analysis.response.foreign_recordings.foreign import ForeignResponse
+from backend.analysis.response.foreign_recordings.product_model import TURN, ProductModel
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.product_model import TURN, ProductModel
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import collocated as threshold
 

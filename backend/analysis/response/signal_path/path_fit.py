@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from backend.analysis.response.sampled_model import LoopModel, SampledFit
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.signal_path.sampling import (
     Hold,
     SignalPath,
     command_delay_s,

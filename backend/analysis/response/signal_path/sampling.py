@@ -3,7 +3,7 @@
 The bus sends one value per cycle of length T; the drive holds it (zero-order), or interpolates
 towards it when 60C2h is in use (linear, one cycle later), passes it through the current loop
 (first order here) and a delay. All of that is known and can be divided out; the images that
-sampling folds back are not, see :mod:`backend.analysis.response.sampled_model`.
+sampling folds back are not, see :mod:`backend.analysis.response.signal_path.sampled_model`.
 """
 
 from __future__ import annotations

@@ -14,29 +14,38 @@ from functools import partial
 
 import numpy as np
 
-from backend.analysis.mechanics.fit_problem import KnownInertia
-from backend.analysis.mechanics.identification_trials import (
+from backend.analysis.mechanics.identification.fit_problem import KnownInertia
+from backend.analysis.mechanics.identification.identification_trials import (
     TRUSTED_ERROR,
     Task,
     Trial,
     mode_uncertainties_of,
     rank,
 )
-from backend.analysis.mechanics.inertia_by_place import InertiaByPlace, inertia_by_place
-from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty
+from backend.analysis.mechanics.identification.inertia_by_place import (
+    InertiaByPlace,
+    inertia_by_place,
+)
+from backend.analysis.mechanics.identification.mode_uncertainty import ModeUncertainty
 from backend.analysis.response.distortion import Distortion, distortion
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.path_fit import (
+from backend.analysis.response.reported_signals.reported import charged, current_uncertainty
+from backend.analysis.response.reported_signals.reported_demand import (
+    demand_path,
+    with_acting_torque,
+)
+from backend.analysis.response.reported_signals.reported_speed import (
+    speed_contradicts,
+    speed_suspect,
+)
+from backend.analysis.response.signal_path.path_fit import (
     at_whole_cycles,
     find_paths,
     torque_left,
 )
-from backend.analysis.response.reference_gain import ReferenceLoop
-from backend.analysis.response.reported import charged, current_uncertainty
-from backend.analysis.response.reported_demand import demand_path, with_acting_torque
-from backend.analysis.response.reported_speed import speed_contradicts, speed_suspect
-from backend.analysis.response.sampled_model import SampledFit
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.reference_gain import ReferenceLoop
+from backend.analysis.response.signal_path.sampled_model import SampledFit
+from backend.analysis.response.signal_path.sampling import (
     DIRECT_SHARE,
     USUAL_CURRENT_HZ,
     Hold,

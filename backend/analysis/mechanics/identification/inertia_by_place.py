@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampling import SignalPath, reported_response
+from backend.analysis.response.signal_path.sampling import SignalPath, reported_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import (
     Quantity,

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampling import SignalPath, lag_response
+from backend.analysis.response.signal_path.sampling import SignalPath, lag_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record, good_periods, period_spectra
 from backend.analysis.thresholds import reported as threshold

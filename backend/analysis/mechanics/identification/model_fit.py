@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.mechanics.chain_model import modal_start
-from backend.analysis.mechanics.fit_problem import (
+from backend.analysis.mechanics.identification.fit_problem import (
     CHAIN,
     MODAL,
     USUAL_CORNER,
@@ -23,15 +23,15 @@ from backend.analysis.mechanics.fit_problem import (
     View,
     best_view,
 )
-from backend.analysis.mechanics.load_search import (
+from backend.analysis.mechanics.identification.load_search import (
     informative_lines,
     with_one_more,
     with_one_more_mode,
 )
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
 from backend.analysis.response.frf import Frf, valid_band_hz
-from backend.analysis.response.sampled_model import LoopModel, SampledFit
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.arrays import BoolArray, FloatArray
 from backend.analysis.thresholds import model_fit as threshold
 

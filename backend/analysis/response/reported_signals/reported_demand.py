@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from backend.analysis.response.path_fit import PathFit
-from backend.analysis.response.sampled_model import SampledFit, Sampler
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.path_fit import PathFit
+from backend.analysis.response.signal_path.sampled_model import SampledFit, Sampler
+from backend.analysis.response.signal_path.sampling import (
     USUAL_CURRENT_HZ,
     Hold,
     SignalPath,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from backend.analysis.mechanics.identification.mode_uncertainty import ModeUncertainty
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty
 from backend.analysis.mechanics.resonance import Resonance
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import resonance_table as threshold

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.response.path_fit import PathFit, ranked
-from backend.analysis.response.sampled_model import LoopModel, SampledFit
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.path_fit import PathFit, ranked
+from backend.analysis.response.signal_path.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.signal_path.sampling import (
     Hold,
     SignalPath,
     sampled_command_response,

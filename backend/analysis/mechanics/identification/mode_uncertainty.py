@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from backend.analysis.mechanics.fit_problem import Problem, robust_rows
+from backend.analysis.mechanics.identification.fit_problem import Problem, robust_rows
 from backend.analysis.mechanics.mechanical_model import Mode
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import mode_uncertainty as threshold

@@ -9,20 +9,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.loop.loop_fit import fit_loop
-from backend.analysis.mechanics.fit_problem import KnownInertia
-from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
-from backend.analysis.mechanics.model_fit import Solution, fit_sampled_model, views_of
+from backend.analysis.mechanics.identification.fit_problem import KnownInertia
+from backend.analysis.mechanics.identification.mode_uncertainty import (
+    ModeUncertainty,
+    mode_uncertainties,
+)
+from backend.analysis.mechanics.identification.model_fit import (
+    Solution,
+    fit_sampled_model,
+    views_of,
+)
 from backend.analysis.mechanics.reversals import with_balanced_reversals
 from backend.analysis.response.frf import Frf, estimate_periodic
-from backend.analysis.response.path_fit import (
+from backend.analysis.response.reported_signals.reported_speed import (
+    with_position_speed,
+    without_weight,
+)
+from backend.analysis.response.signal_path.path_fit import (
     at_whole_cycles,
     moved_path,
     path_between,
     path_covariance,
 )
-from backend.analysis.response.reported_speed import with_position_speed, without_weight
-from backend.analysis.response.sampled_model import LoopModel, SampledFit
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampled_model import LoopModel, SampledFit
+from backend.analysis.response.signal_path.sampling import (
     Hold,
     SignalPath,
     command_delay_s,

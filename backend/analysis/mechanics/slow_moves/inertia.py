@@ -15,8 +15,8 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from backend.analysis.mechanics.load_swing import find_swings, lag_of_load, lag_slopes
-from backend.analysis.mechanics.load_terms import (
+from backend.analysis.mechanics.slow_moves.load_swing import find_swings, lag_of_load, lag_slopes
+from backend.analysis.mechanics.slow_moves.load_terms import (
     NO_LOAD_TERMS,
     FoundTerms,
     Motion,
@@ -24,7 +24,7 @@ from backend.analysis.mechanics.load_terms import (
     find_terms,
     independent_share,
 )
-from backend.analysis.mechanics.position_torque import angle_of
+from backend.analysis.mechanics.slow_moves.position_torque import angle_of
 from backend.analysis.signals.arrays import BoolArray, FloatArray
 from backend.analysis.thresholds import inertia as threshold
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampling import (
     SignalPath,
     delay_response,
     hold_response,

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.response.sampling import Hold, hold_response
+from backend.analysis.response.signal_path.sampling import Hold, hold_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import reference_path as threshold
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from backend.analysis.mechanics.model_fit import Solution
+from backend.analysis.mechanics.identification.model_fit import Solution
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.line_spectra import Record

@@ -18,7 +18,7 @@ from backend.analysis.mechanics.chain_model import (
     responses_with_load,
     with_load,
 )
-from backend.analysis.mechanics.fit_problem import (
+from backend.analysis.mechanics.identification.fit_problem import (
     HIGHEST_TRIED,
     USUAL_DAMPING,
     Found,
@@ -27,7 +27,7 @@ from backend.analysis.mechanics.fit_problem import (
     best_view,
 )
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
-from backend.analysis.response.sampling import delay_response
+from backend.analysis.response.signal_path.sampling import delay_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import load_search as threshold
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.mechanics.resonance import Resonance
-from backend.analysis.response.product_model import ProductFit
+from backend.analysis.response.foreign_recordings.product_model import ProductFit
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import modes_found as threshold
 
