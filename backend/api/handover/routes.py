@@ -49,7 +49,7 @@ from backend.station.bench import Bench
 from backend.station.drives.description import import_in_process
 from drivers.errors import NotAllowed
 from drivers.texts.message import language, text
-from profiles.importer.esi_controller import ControllersTask
+from profiles.importer.esi.controller import ControllersTask
 from profiles.schema import Profile, Raw
 
 router = APIRouter()

@@ -36,7 +36,7 @@ from drivers.texts.message import Text, text
 from drivers.texts.profile_words import translated
 from profiles import drive_names
 from profiles.importer import ImportFailed, export_eds, export_esi
-from profiles.importer.esi import MAX_BYTES
+from profiles.importer.esi.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.language.overlay import Language
 from profiles.loader import user_folder

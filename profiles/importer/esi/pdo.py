@@ -6,10 +6,10 @@ from typing import Literal
 from xml.etree.ElementTree import Element
 
 from profiles.importer.description import MAX_ENTRIES, DescribedEntry, DescribedPdo
-from profiles.importer.esi_modules import Part
+from profiles.importer.esi.modules import Part
+from profiles.importer.esi.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.importer.report import ImportReport
 from profiles.importer.values import named_type, tidy, whole_number
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.schema import Access
 
 #: Bits of a whole object by its type; for others, the file states the mapped bits.

@@ -7,7 +7,8 @@ from dataclasses import replace
 from xml.etree.ElementTree import Element
 
 from profiles.importer.description import DescribedEntry
-from profiles.importer.esi_types import EsiTypes, Member
+from profiles.importer.esi.types import EsiTypes, Member
+from profiles.importer.esi.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.importer.report import ImportReport
 from profiles.importer.values import (
     fit,
@@ -19,7 +20,6 @@ from profiles.importer.values import (
     unit_of_name,
     whole_number,
 )
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.schema import Access, DataType, PdoMapping, Raw
 
 _UNSIGNED_BITS = {"UINT8": 8, "UINT16": 16, "UINT32": 32, "UINT64": 64}

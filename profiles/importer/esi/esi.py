@@ -22,15 +22,12 @@ from profiles.importer.description import (
     DescribedPdo,
     Description,
 )
-from profiles.importer.esi_bring_up import read_bring_up
-from profiles.importer.esi_modules import dictionaries_of, module_list, overwritten, parts_of
-from profiles.importer.esi_objects import DictionaryReader
-from profiles.importer.esi_pdo import PdoReader
-from profiles.importer.report import ImportFailed, ImportReport
-from profiles.importer.texts import check_size, decode_xml
-from profiles.importer.values import tidy, whole_number
-from profiles.importer.xml_repair import mended
-from profiles.importer.xml_tree import (
+from profiles.importer.esi.bring_up import read_bring_up
+from profiles.importer.esi.modules import dictionaries_of, module_list, overwritten, parts_of
+from profiles.importer.esi.objects import DictionaryReader
+from profiles.importer.esi.pdo import PdoReader
+from profiles.importer.esi.xml_repair import mended
+from profiles.importer.esi.xml_tree import (
     attribute_of,
     child,
     children,
@@ -39,6 +36,9 @@ from profiles.importer.xml_tree import (
     simplify_tags,
     text_of,
 )
+from profiles.importer.report import ImportFailed, ImportReport
+from profiles.importer.texts import check_size, decode_xml
+from profiles.importer.values import tidy, whole_number
 
 MAX_BYTES = 32 * 2**20
 _LARGEST_IDENTITY = 2**32 - 1

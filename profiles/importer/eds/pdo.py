@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from profiles.importer.description import DescribedEntry, DescribedPdo
-from profiles.importer.eds_sections import SUBOBJECT, Section
+from profiles.importer.eds.sections import SUBOBJECT, Section
 from profiles.importer.report import ImportReport
 from profiles.importer.values import node_relative, parse_number
 from profiles.schema import DataType, PdoIdentifier

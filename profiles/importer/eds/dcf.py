@@ -6,8 +6,8 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from profiles.importer.eds import MAX_BYTES, compare_with_lists, identity_of
-from profiles.importer.eds_sections import (
+from profiles.importer.eds.eds import MAX_BYTES, compare_with_lists, identity_of
+from profiles.importer.eds.sections import (
     COMPACT,
     LINE_END,
     OBJECT,

@@ -18,9 +18,9 @@ from profiles.bring_up import (
     SyncSignal,
     WatchdogRegisters,
 )
+from profiles.importer.esi.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 from profiles.importer.report import ImportReport
 from profiles.importer.values import tidy, whole_number
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, name_of, text_of
 
 _PROTOCOLS: tuple[Protocol, ...] = ("aoe", "eoe", "coe", "foe", "soe", "voe")
 _KINDS: dict[str, SyncManagerKind] = {

@@ -14,8 +14,8 @@ from profiles.importer.description import (
     DescribedEntry,
     Description,
 )
-from profiles.importer.eds_pdo import read_pdos
-from profiles.importer.eds_sections import (
+from profiles.importer.eds.pdo import read_pdos
+from profiles.importer.eds.sections import (
     COMMISSIONING,
     COMPACT,
     OBJECT,

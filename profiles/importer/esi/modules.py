@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
 from profiles.bring_up import InitCommand
+from profiles.importer.esi.xml_tree import attribute_of, child, children, flag_of, text_of
 from profiles.importer.report import ImportReport
 from profiles.importer.values import whole_number
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
 
 _MOST_SLOTS = 64
 _MODULE_LIST = 0xF030

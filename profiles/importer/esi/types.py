@@ -6,9 +6,9 @@ import re
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+from profiles.importer.esi.xml_tree import child, children, text_of
 from profiles.importer.report import ImportReport
 from profiles.importer.values import named_type, parse_number, tidy
-from profiles.importer.xml_tree import child, children, text_of
 from profiles.schema import DataType
 
 _DEEPEST = 8

@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass
 from typing import Literal, TypeAlias
 from xml.etree.ElementTree import Element
 
-from profiles.importer.esi import EsiFile, esi_devices, open_esi
-from profiles.importer.esi_bring_up import assign_activate, manager_kind, signed_number
+from profiles.importer.esi.bring_up import assign_activate, manager_kind, signed_number
+from profiles.importer.esi.esi import EsiFile, esi_devices, open_esi
+from profiles.importer.esi.xml_tree import attribute_of, child, children, flag_of, text_of
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.importer.values import whole_number
-from profiles.importer.xml_tree import attribute_of, child, children, flag_of, text_of
 
 SyncKind = Literal["mailbox_out", "mailbox_in", "outputs", "inputs"]
 _MEMORY, _MEMORY_END = 0x1000, 0x10000
