@@ -59,7 +59,7 @@ from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
 from backend.station.recording.rerun_feed import RerunFeed
 from backend.station.recording.service import Recordings
-from drivers.computer import scheduling
+from drivers.computer.timing import scheduling
 from drivers.texts.message import language, text
 
 PREFIX = "/api/v1"

@@ -49,15 +49,15 @@ _PYSERIAL = "pyserial gives some errors of the system as nothing but its own tex
 #: nothing but its text or number, or words that are shown and nothing else.
 ALLOWED: dict[tuple[str, str], str] = {
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         "if error.args[0] == errno.EINTR:",
     ): "termios.error carries its number as its first argument only",
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         "windows = _WIN_ERROR.search(text)",
     ): _PYSERIAL,
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         'posix = re.search(r"\\[Errno (\\d+)\\]", text)',
     ): _PYSERIAL,
     (

@@ -11,7 +11,7 @@ import serial
 from drivers.adapters import require_channel, serial_device
 from drivers.canopen.adapters.slcan import AdapterBlocked, AdapterLost, SlcanBus
 from drivers.canopen.url import CanUrl
-from drivers.computer.terminals import deliver_soon, port_errno
+from drivers.computer.serial_ports.terminals import deliver_soon, port_errno
 from drivers.errors import DriveError, LinkLost
 from drivers.texts.message import Text, text
 

@@ -13,7 +13,7 @@ import can
 import serial
 from can.interfaces.slcan import slcanBus
 
-from drivers.computer.terminals import TERMINAL_ERRORS, flush
+from drivers.computer.serial_ports.terminals import TERMINAL_ERRORS, flush
 
 
 class AdapterBlocked(can.CanOperationError):

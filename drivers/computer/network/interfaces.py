@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.computer.packet_capture import adapters
+from drivers.computer.network.packet_capture import adapters
 
 _NET = Path("/sys/class/net")
 _ARPHRD_ETHER, _ARPHRD_CAN = 1, 280

@@ -8,8 +8,8 @@ import signal
 import sys
 from dataclasses import dataclass
 
-from drivers.computer import scheduling
 from drivers.computer.processes import prefer_process
+from drivers.computer.timing import scheduling
 from drivers.texts.message import Text, text
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2

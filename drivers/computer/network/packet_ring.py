@@ -17,7 +17,7 @@ import socket
 import struct
 from collections.abc import Iterator
 
-from drivers.computer.sockets import AF_PACKET
+from drivers.computer.network.sockets import AF_PACKET
 
 _ALL, _ETHERCAT = 0x0003, 0x88A4
 _SOL_PACKET, _RX_RING, _STATISTICS, _VERSION, _TPACKET_V3 = 263, 5, 6, 10, 2

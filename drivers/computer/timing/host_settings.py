@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.computer.ethtool import SETTINGS, write_card
-from drivers.computer.host_facts import Computer
+from drivers.computer.network.ethtool import SETTINGS, write_card
+from drivers.computer.timing.host_facts import Computer
 
 #: Only these are ever written, whatever a restore list on the disk contains.
 _FILES = ("sys/devices/system/cpu/", "proc/irq/")

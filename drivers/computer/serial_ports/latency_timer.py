@@ -32,7 +32,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from drivers.computer.registry import REGISTRY, Registry
-from drivers.computer.terminals import is_in_use
+from drivers.computer.serial_ports.terminals import is_in_use
 
 LATENCY_MS = (1, 255)
 """Range of the timer [ms]."""

@@ -1,9 +1,10 @@
 """Measures the wake-up delay of a real-time thread and the round trip of a frame.
 
 Runs as a process of its own under the conditions of the EtherCAT process, so that the server's own
-scheduling has no influence: ``python -m drivers.computer.lateness PERIOD_US SECONDS [INTERFACE]``
-prints one line of JSON. With an interface each cycle sends one EtherCAT frame that reads register
-0000h of all slaves (BRD: nothing is written) and waits for its return until the cycle ends.
+scheduling has no influence:
+``python -m drivers.computer.timing.lateness PERIOD_US SECONDS [INTERFACE]`` prints one line of
+JSON. With an interface each cycle sends one EtherCAT frame that reads register 0000h of all slaves
+(BRD: nothing is written) and waits for its return until the cycle ends.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from drivers.computer import realtime
-from drivers.computer.sockets import AF_PACKET
+from drivers.computer.network.sockets import AF_PACKET
+from drivers.computer.timing import realtime
 
 #: Upper edges of the histogram bins [µs]: six per decade from 1 µs to 1 s.
 EDGES_US = tuple(round(10 ** (step / 6), 2) for step in range(37))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from drivers.computer.ethtool import read_card
-from drivers.computer.sockets import interface_flags
+from drivers.computer.network.ethtool import read_card
+from drivers.computer.network.sockets import interface_flags
 
 Preemption = Literal["rt", "full", "dynamic", "voluntary", "unknown"]
 _CAPABILITY_BITS = {"CAP_NET_ADMIN": 12, "CAP_NET_RAW": 13, "CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}
