@@ -17,8 +17,8 @@ from drivers.virtual.device import (
     ABORT_UNSUPPORTED,
     SdoAbort,
 )
-from drivers.virtual.wires.ethercat import sdoinfo
-from drivers.virtual.wires.ethercat.dictionary import CoeDictionary
+from drivers.virtual.wires.ethercat.mailbox import sdoinfo
+from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary
 
 _EMERGENCY, _SDO_REQUEST, _SDO_RESPONSE, _SDO_INFORMATION = 1, 2, 3, 8
 _ABORT_COMMAND = 0x80

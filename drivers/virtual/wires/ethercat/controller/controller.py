@@ -8,10 +8,10 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple, Protocol
 
-from drivers.virtual.wires.ethercat import registers as reg
-from drivers.virtual.wires.ethercat.dc import DistributedClock
-from drivers.virtual.wires.ethercat.sii import Eeprom
-from drivers.virtual.wires.ethercat.syncmanager import Fmmu, SyncManager, parse_fmmu
+from drivers.virtual.wires.ethercat.controller import registers as reg
+from drivers.virtual.wires.ethercat.controller.dc import DistributedClock
+from drivers.virtual.wires.ethercat.controller.sii import Eeprom
+from drivers.virtual.wires.ethercat.controller.syncmanager import Fmmu, SyncManager, parse_fmmu
 
 _FMMUS, _SYNC_MANAGERS = 4, 4
 _FMMU_END = reg.FMMU + 16 * _FMMUS

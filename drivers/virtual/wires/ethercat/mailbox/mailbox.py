@@ -11,8 +11,8 @@ import struct
 from collections import deque
 from typing import Protocol
 
-from drivers.virtual.wires.ethercat.coe import CoeServer, MailboxError
-from drivers.virtual.wires.ethercat.syncmanager import SyncManager
+from drivers.virtual.wires.ethercat.controller.syncmanager import SyncManager
+from drivers.virtual.wires.ethercat.mailbox.coe import CoeServer, MailboxError
 
 HEADER = 6
 _ERROR, _COE, _FOE = 0, 3, 4

@@ -7,7 +7,7 @@ import struct
 from drivers.codec import encode
 from drivers.errors import OutOfRange
 from drivers.virtual.device import ABORT_UNSUPPORTED, EntryInfo, SdoAbort
-from drivers.virtual.wires.ethercat.dictionary import CoeDictionary
+from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary
 from profiles.schema import DataType, Parameter
 
 _LIST_REQUEST, _LIST_ANSWER = 1, 2

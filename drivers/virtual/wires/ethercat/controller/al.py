@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from drivers.virtual.wires.ethercat.registers import ERROR_FLAG, AlCode, AlState
+from drivers.virtual.wires.ethercat.controller.registers import ERROR_FLAG, AlCode, AlState
 
 _ALLOWED: dict[AlState, tuple[AlState, ...]] = {
     AlState.INIT: (AlState.PREOP, AlState.BOOT),

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import struct
 
-from drivers.virtual.wires.ethercat import registers as reg
 from drivers.virtual.wires.ethercat.clock import WireClock
+from drivers.virtual.wires.ethercat.controller import registers as reg
 
 HOP_NS = 600
 """Delay of one slave and its cable; order of magnitude of real devices."""

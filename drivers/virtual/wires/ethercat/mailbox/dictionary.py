@@ -23,7 +23,7 @@ from drivers.virtual.device import (
     EntryInfo,
     SdoAbort,
 )
-from drivers.virtual.wires.ethercat.registers import AlState
+from drivers.virtual.wires.ethercat.controller.registers import AlState
 from profiles.schema import DataType, Parameter, PdoPart
 
 ABORT_COUNT_NOT_ZERO = 0x06010003
