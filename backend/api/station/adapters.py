@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from backend.api.context import TheBench
+from backend.api.requests.context import TheBench
 from backend.api.station.models_preflight import LatencyRequest, LatencyTimerInfo
 from backend.foundation.preflight.adapters import LOWERED_MS, Adapters, most_reads
 from backend.station.bench import Bench

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from backend.api import convert
-from backend.api.context import TheBench, TheDrive
-from backend.api.errors import message_of, words_of
-from backend.api.models import JobInfo
-from backend.api.named_profile import profile_files, profile_named
+from backend.api.messages import convert
+from backend.api.messages.errors import message_of, words_of
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import TheBench, TheDrive
+from backend.api.requests.named_profile import profile_files, profile_named
 from backend.api.station.models import ProfileMatch
 from backend.api.station.models_description import (
     PROFILE_NAME,

@@ -8,9 +8,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from backend.api import convert
-from backend.api.context import TheBench
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import TheBench
 from backend.api.station.models_preflight import (
     FixRequest,
     PreflightFinding,

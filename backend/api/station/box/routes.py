@@ -6,7 +6,7 @@ import asyncio
 
 from fastapi import APIRouter, Request
 
-from backend.api.context import Me, TheBench
+from backend.api.requests.context import Me, TheBench
 from backend.api.station.box.models import BoxChange, BoxInfo, BoxPort
 from backend.station.install.box.kept import Box, keep, read
 from backend.station.install.box.roles import addresses_of, checked, port_of

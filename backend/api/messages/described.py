@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaMode
 
 from backend.api.live.messages import FromPage, ToPage
-from backend.api.models import Problem
+from backend.api.messages.models import Problem
 
 _PLAIN, _PROBLEM = "application/json", "application/problem+json"
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, Raw
+from backend.api.messages.models import Message, Raw
 
 FormatName = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 ConsequenceName = Literal["motion", "unit", "limit", "gain", "other"]

@@ -12,7 +12,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
-from backend.api.models import Problem
+from backend.api.messages.models import Problem
 from backend.foundation.people.errors import Forbidden, NoSuchPerson, NotLoggedIn, TooOften
 from backend.tools.wire_message import MessageInfo
 from drivers.errors import (

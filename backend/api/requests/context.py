@@ -10,7 +10,7 @@ from typing import Annotated
 
 from fastapi import Depends, Header, Request
 
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
 from backend.foundation.people.errors import NotLoggedIn
 from backend.foundation.people.identity import Identity, acting
 from backend.foundation.people.station import People

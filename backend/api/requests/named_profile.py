@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
 from drivers.texts.profile_errors import profile_error_text
 from profiles import load_profile
 from profiles.loader import ProfileError

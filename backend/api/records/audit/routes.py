@@ -9,7 +9,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query
 from fastapi.responses import StreamingResponse
 
-from backend.api.audit.models import (
+from backend.api.messages.errors import message_or_none, words_of
+from backend.api.records.audit.models import (
     AuditEvent,
     AuditKind,
     AuditNames,
@@ -17,9 +18,8 @@ from backend.api.audit.models import (
     AuditStatus,
     AuditVerdict,
 )
-from backend.api.context import TheBench
-from backend.api.errors import message_or_none, words_of
-from backend.api.times import in_utc
+from backend.api.requests.context import TheBench
+from backend.api.requests.times import in_utc
 from backend.records.audit.chain import Anchor
 from backend.records.audit.facts import KINDS
 from backend.records.audit.trail import Event, Filter

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from backend.api import models
 from backend.api.drive import models_axis, models_parameters
 from backend.api.drive.convert_stop import turning
-from backend.api.errors import message_of, message_or_none, problem_of, words_of
-from backend.api.sets import models as models_sets
+from backend.api.messages import models
+from backend.api.messages.errors import message_of, message_or_none, problem_of, words_of
+from backend.api.records.sets import models as models_sets
 from backend.api.station import models as models_bench
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.readings import Reading

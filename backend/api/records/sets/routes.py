@@ -8,12 +8,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheDrive
-from backend.api.errors import NotFound, message_of, words_of
-from backend.api.library import convert as convert_library
-from backend.api.library.models import StoredSet, ThreeWay
-from backend.api.sets.models import Diff, SaveSetRequest
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, message_of, words_of
+from backend.api.records.library import convert as convert_library
+from backend.api.records.library.models import StoredSet, ThreeWay
+from backend.api.records.sets.models import Diff, SaveSetRequest
+from backend.api.requests.context import Controlled, TheBench, TheDrive
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.readings import Reading
 from backend.axes.parameters import set_file as parameter_set

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from backend.api.errors import message_of, message_or_none, words_of
-from backend.api.library.models import (
+from backend.api.messages.errors import message_of, message_or_none, words_of
+from backend.api.records.library.models import (
     AxisInfo,
     LibraryEntry,
     StoredSet,

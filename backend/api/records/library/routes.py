@@ -10,10 +10,9 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
 
-from backend.api.context import TheBench
-from backend.api.errors import NotFound, message_of, words_of
-from backend.api.library import convert as convert_library
-from backend.api.library.models import (
+from backend.api.messages.errors import NotFound, message_of, words_of
+from backend.api.records.library import convert as convert_library
+from backend.api.records.library.models import (
     LibraryChange,
     LibraryEntry,
     LibraryKind,
@@ -21,8 +20,9 @@ from backend.api.library.models import (
     TagCount,
     VersionInfo,
 )
+from backend.api.requests.context import TheBench
+from backend.api.requests.times import in_utc
 from backend.api.scope.recordings import TheRecordings
-from backend.api.times import in_utc
 from backend.records.library import NotInLibrary, sharing
 from backend.records.library.entries import Entry, Remarks, require_unchanged
 from backend.records.library.entries import Query as LibraryQuery

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message, Raw
-from backend.api.sets.models import SetFileInfo
+from backend.api.messages.models import Message, Raw
+from backend.api.records.sets.models import SetFileInfo
 from backend.tools.wire_message import MessageInfo
 
 LibraryKind = Literal["set", "recording", "measurement", "report"]

@@ -11,9 +11,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from backend.api.context import TheBench, TheDrive, member_of
-from backend.api.errors import NotFound
-from backend.api.handover.models import (
+from backend.api.messages.errors import NotFound
+from backend.api.records.handover.models import (
     HandedOverInfo,
     HandoverChanges,
     HandoverChoice,
@@ -27,6 +26,7 @@ from backend.api.handover.models import (
     SegmentAxis,
     SegmentHandoverRequest,
 )
+from backend.api.requests.context import TheBench, TheDrive, member_of
 from backend.axes.drive.drive import Drive
 from backend.axes.parameters import set_file as parameter_set
 from backend.axes.parameters.set_file import BadSet, ParameterSet

@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api.context import TheBench
-from backend.api.errors import NotFound, message_of, words_of
-from backend.api.named_profile import profile_named
+from backend.api.messages.errors import NotFound, message_of, words_of
+from backend.api.requests.context import TheBench
+from backend.api.requests.named_profile import profile_named
 from backend.api.station.models_description import ImportedList, RowNotExported
 from backend.axes.parameters.csv_list import LeftOut
 from backend.axes.parameters.lists import export_list, import_list
