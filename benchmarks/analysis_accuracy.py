@@ -20,7 +20,7 @@ sys.path[:0] = [
 
 from measured_axes import NAMED, errors, measure  # noqa: E402
 
-from backend.analysis.mechanics.identify import identify_mechanics  # noqa: E402
+from backend.analysis.mechanics.identification.identify import identify_mechanics  # noqa: E402
 
 LOOPS = ((0.0, False), (10.0, False), (40.0, False), (40.0, True), (80.0, False))
 

@@ -25,9 +25,9 @@ from drive_sim import Mechanics, simulate  # noqa: E402
 from measured_axes import NAMED, Measurement, measure, tuned_drive  # noqa: E402
 from scipy.signal import csd, find_peaks, welch  # noqa: E402
 
-from backend.analysis.mechanics.identify import Identification, identify_mechanics  # noqa: E402
+from backend.analysis.mechanics.identification.identify import Identification, identify_mechanics  # noqa: E402
 from backend.analysis.response.frf_stepped import estimate_stepped  # noqa: E402
-from backend.analysis.response.sampling import SignalPath  # noqa: E402
+from backend.analysis.response.signal_path.sampling import SignalPath  # noqa: E402
 from backend.analysis.signals.arrays import ComplexArray, FloatArray  # noqa: E402
 from backend.analysis.signals.chirp import chirp  # noqa: E402
 from backend.analysis.signals.excitation import scaled  # noqa: E402

@@ -18,8 +18,8 @@ from pathlib import Path
 import can
 
 from backend.station.doctor import examined
+from drivers.canopen.adapters.slcan import ERROR_ACKNOWLEDGE, ERROR_PROTOCOL
 from drivers.canopen.link import CanopenLink
-from drivers.canopen.slcan import ERROR_ACKNOWLEDGE, ERROR_PROTOCOL
 from drivers.link import Address, LinkEvent
 from drivers.virtual.wires.can_wire import CanWire, PythonCanSide
 from drivers.virtual.wires.canopen import CanopenNode

@@ -20,7 +20,7 @@ from scipy.signal import coherence, csd, welch
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from backend.analysis.response import foreign  # noqa: E402
+from backend.analysis.response.foreign_recordings import foreign  # noqa: E402
 from tests.support.two_masses import Bench, multisine  # noqa: E402
 
 RATE, LINES = 2500.0, np.arange(11, 251)

@@ -25,8 +25,8 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-from drivers.computer.packet_capture import NPF_NAME
-from drivers.computer.terminals import has_descriptor, own_terminals
+from drivers.computer.network.packet_capture import NPF_NAME
+from drivers.computer.serial_ports.terminals import has_descriptor, own_terminals
 from drivers.errors import LinkLost, OutOfRange
 from drivers.texts.message import text
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.computer.scheduling import VIRTUAL_PRIORITY
+from drivers.computer.timing.scheduling import VIRTUAL_PRIORITY
 from tests.support import long_suite
 from tests.support.hang import EndsWhatHangs
 

@@ -27,8 +27,9 @@ _FOLDER = "Jürgen Müller 王伟/OneDrive - Größe GmbH"
 #: Modules with binaries; pysoem is not among them, as it needs Npcap, which no folder contains.
 _MODULES = (
     "ssl", "sqlite3", "ctypes", "winreg", "serial", "can", "zeroconf", "sqlalchemy", "psutil",
-    "drivers.computer.terminals", "drivers.computer.latency_timer",
-    "drivers.computer.packet_capture", "drivers.computer.registry", "backend.foundation.store.lock",
+    "drivers.computer.serial_ports.terminals", "drivers.computer.serial_ports.latency_timer",
+    "drivers.computer.network.packet_capture", "drivers.computer.registry",
+    "backend.foundation.store.lock",
     "numpy", "pydantic_core", "cryptography.x509",
 )  # fmt: skip
 #: Ends with 0 where the first process has the lock and the second one has not.

@@ -321,7 +321,7 @@ class notch_effect:
 
 
 class fit_problem:
-    """`mechanics/fit_problem.py`."""
+    """`mechanics/identification/fit_problem.py`."""
 
     USUAL_DELAY_S = 60e-6
     """[s] Delays that no path shows are small: this one standard deviation, in s, next to the
@@ -379,7 +379,9 @@ class friction:
 
 
 class identify:
-    """`mechanics/identify.py`, `mechanics/identification_trials.py`."""
+    """`mechanics/identification/identify.py`,
+    `mechanics/identification/identification_trials.py`.
+    """
 
     TRUSTED_ERROR = 0.03
     """[ratio] A model whose median relative misfit is larger, and larger than the noise, corrects
@@ -476,7 +478,7 @@ class identify:
 
 
 class inertia:
-    """`mechanics/inertia.py`."""
+    """`mechanics/slow_moves/inertia.py`."""
 
     SYSTEMATIC_SHARE = (0.005, 0.05, 0.03, 0.01)
     """[ratio] Shares of J, viscous, Coulomb and gravity torque by which compliance, timing and the
@@ -501,7 +503,7 @@ class inertia:
 
 
 class inertia_by_place:
-    """`mechanics/inertia_by_place.py`."""
+    """`mechanics/identification/inertia_by_place.py`."""
 
     SHARE = 0.2
     """[ratio] Lines to this share of the sample rate: products of motions are folded above. Origin:
@@ -517,7 +519,7 @@ class inertia_by_place:
 
 
 class load_search:
-    """`mechanics/load_search.py`."""
+    """`mechanics/identification/load_search.py`."""
 
     LOWEST_TRIED = 1.3
     """[ratio] Antiresonances that are tried, from this multiple of the lowest line. Origin:
@@ -541,7 +543,7 @@ class load_search:
 
 
 class load_swing:
-    """`mechanics/load_swing.py`."""
+    """`mechanics/slow_moves/load_swing.py`."""
 
     # STEP, DAMPINGS: What the search looks at: ratios of neighbouring frequencies, and dampings.
     STEP = 1.07
@@ -567,7 +569,7 @@ class load_swing:
 
 
 class load_terms:
-    """`mechanics/load_terms.py`."""
+    """`mechanics/slow_moves/load_terms.py`."""
 
     PLAIN = 0.5
     """[ratio] A term that takes this share of the power that is left is there, whatever the noise.
@@ -607,7 +609,7 @@ class load_terms:
 
 
 class mode_uncertainty:
-    """`mechanics/mode_uncertainty.py`."""
+    """`mechanics/identification/mode_uncertainty.py`."""
 
     SYSTEMATIC = (3e-4, 0.03, 0.0)
     """[ratio] What path and interpolation leave of frequency and damping however long one measures,
@@ -625,7 +627,7 @@ class mode_uncertainty:
 
 
 class model_fit:
-    """`mechanics/model_fit.py`."""
+    """`mechanics/identification/model_fit.py`."""
 
     # WORTHWHILE, MODES_GAIN: One more load must gain this much, free modes instead of a chain that
     # much.
@@ -659,7 +661,7 @@ class model_fit:
 
 
 class position_torque:
-    """`mechanics/position_torque.py`."""
+    """`mechanics/slow_moves/position_torque.py`."""
 
     LONGEST = 8.0
     """[ratio] The longest period looked for, in ways of the move: a sine is a straight line and a
@@ -674,7 +676,7 @@ class position_torque:
 
 
 class resonance_table:
-    """`mechanics/resonance_table.py`."""
+    """`mechanics/identification/resonance_table.py`."""
 
     LOWEST_MODE_HZ = 15.0
     """[Hz] Weak modes below this are artefacts of friction more often than mechanics. Origin:
@@ -712,7 +714,7 @@ class reversals:
 
 
 class robust_fit:
-    """`mechanics/robust_fit.py`."""
+    """`mechanics/identification/robust_fit.py`."""
 
     # LEAST_DAMPING, MOST_DAMPING: Bounds of the damping of the Levenberg-Marquardt steps.
     LEAST_DAMPING = 1e-9
@@ -748,7 +750,7 @@ class stribeck:
 
 
 class collocated:
-    """`response/collocated.py`."""
+    """`response/foreign_recordings/collocated.py`."""
 
     # TOLERATED_DEG, IN_A_ROW: Lines beyond ±90° by more than this and their band contradict; so
     # many in a row are no chance.
@@ -816,7 +818,7 @@ class distortion:
 
 
 class excitation_found:
-    """`response/excitation_found.py`."""
+    """`response/foreign_recordings/excitation_found.py`."""
 
     # UNLIKE, UNLIKE_TWICE, AS_MUCH: Two passes of a period that differ by more than this share of
     # the power are not the same: where all later ones are as much alike, and where there are two
@@ -872,7 +874,7 @@ class excitation_found:
 
 
 class foreign:
-    """`response/foreign.py`."""
+    """`response/foreign_recordings/foreign.py`."""
 
     # LEAST_LINES, LEAST_SAMPLES: Fewer lines, or samples, are no frequency response.
     LEAST_LINES = 12
@@ -941,7 +943,7 @@ class frf:
 
 
 class local_polynomial:
-    """`response/local_polynomial.py`."""
+    """`response/foreign_recordings/local_polynomial.py`."""
 
     SPARE = 10
     """[count] Equations of a window beyond its unknowns, which show the scatter. Origin:
@@ -949,7 +951,7 @@ class local_polynomial:
 
 
 class modes_found:
-    """`response/modes_found.py`."""
+    """`response/foreign_recordings/modes_found.py`."""
 
     LEAST_DB = 3.0
     """[dB] A peak or valley stands out so much from the curve, without its slope. Origin:
@@ -965,7 +967,7 @@ class modes_found:
 
 
 class path_fit:
-    """`response/path_fit.py`."""
+    """`response/signal_path/path_fit.py`."""
 
     MOST_CYCLES = 3.5
     """[cycles] Setpoints are in force after this many cycles at most. Origin: 06d2dd3d with
@@ -1010,7 +1012,7 @@ class path_fit:
 
 
 class product_model:
-    """`response/product_model.py`."""
+    """`response/foreign_recordings/product_model.py`."""
 
     WORTH = 0.8
     """[ratio] A further pair must leave less than this of what the lines differ by from the model.
@@ -1040,7 +1042,7 @@ class product_model:
 
 
 class reference_gain:
-    """`response/reference_gain.py`."""
+    """`response/signal_path/reference_gain.py`."""
 
     UNRELATED = 0.5
     """[ratio] A torque of which more than this share (power) is not made of the reference does not
@@ -1056,7 +1058,7 @@ class reference_gain:
 
 
 class reference_path:
-    """`response/reference_path.py`."""
+    """`response/signal_path/reference_path.py`."""
 
     OFF = 0.02
     """[ratio] What a line may be off by, whatever its scatter says (logarithm). Origin:
@@ -1082,7 +1084,7 @@ class reference_path:
 
 
 class repeat_band:
-    """`response/repeat_band.py`."""
+    """`response/foreign_recordings/repeat_band.py`."""
 
     # REACH, POOL: Lines to each side of the local parabola, and of the mean of what it leaves.
     REACH = 6
@@ -1125,7 +1127,7 @@ class load_response:
 
 
 class reported:
-    """`response/reported.py`."""
+    """`response/reported_signals/reported.py`."""
 
     # MOST_CYCLES, SAME: A speed may be a mean over so many cycles; it is one where half of the
     # upper lines differ by less.
@@ -1148,7 +1150,7 @@ class reported:
 
 
 class reported_demand:
-    """`response/reported_demand.py`."""
+    """`response/reported_signals/reported_demand.py`."""
 
     # AT_ONCE_HZ, CLEARLY: A torque follows at once where this corner leaves less than this share of
     # what an ordinary current loop does.
@@ -1159,7 +1161,7 @@ class reported_demand:
 
 
 class reported_speed:
-    """`response/reported_speed.py`."""
+    """`response/reported_signals/reported_speed.py`."""
 
     FINER = 8
     """[count] Samples between two samples for a derivative. Origin: line_spectra.FINER."""
@@ -1180,14 +1182,14 @@ class reported_speed:
 
 
 class sampled_model:
-    """`response/sampled_model.py`."""
+    """`response/signal_path/sampled_model.py`."""
 
     HIGHEST_IMAGE_HZ = 6000.0
     """[Hz] Nothing comes back from above this, whatever the sample rate. Origin: 53a42117."""
 
 
 class sampling:
-    """`response/sampling.py`."""
+    """`response/signal_path/sampling.py`."""
 
     DIRECT_SHARE = 0.25
     """[ratio] Direct estimates hold to this share of the sample rate, sampled-data models to the

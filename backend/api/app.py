@@ -13,25 +13,28 @@ from fastapi.responses import FileResponse
 from fastapi.routing import APIRoute
 
 import backend
-from backend.api import errors
-from backend.api.audit import routes as routes_audit
-from backend.api.audit.audited import AuditedAnswers
-from backend.api.described import DescribedApp, refusals
 from backend.api.drive import functions as routes_functions
 from backend.api.drive import motion_class as routes_motion_class
 from backend.api.drive import restore as routes_pending
 from backend.api.drive import routes as routes_drive
 from backend.api.drive import scales as routes_scales
 from backend.api.drive import terminals as routes_io
-from backend.api.errors import NotFound
-from backend.api.handover import routes as routes_handover
 from backend.api.health import routes as routes_health
 from backend.api.health.unattended import Unattended
-from backend.api.library import routes as routes_library
 from backend.api.live.live import LiveHub
+from backend.api.messages import errors
+from backend.api.messages.described import DescribedApp, refusals
+from backend.api.messages.errors import NotFound
 from backend.api.people import accounts as routes_accounts
 from backend.api.people import session as routes_session
 from backend.api.people import support as routes_support
+from backend.api.records.audit import routes as routes_audit
+from backend.api.records.audit.audited import AuditedAnswers
+from backend.api.records.handover import routes as routes_handover
+from backend.api.records.library import routes as routes_library
+from backend.api.records.sets import lists as routes_lists
+from backend.api.records.sets import routes as routes_sets
+from backend.api.requests.spoken import Spoken
 from backend.api.scope import recordings as routes_recordings
 from backend.api.scope import rerun as routes_rerun
 from backend.api.scope import routes as routes_scope
@@ -39,9 +42,6 @@ from backend.api.scope import scene as routes_scene
 from backend.api.security.gate import Gate
 from backend.api.security.origin import Addresses
 from backend.api.security.socket import OpenSockets
-from backend.api.sets import lists as routes_lists
-from backend.api.sets import routes as routes_sets
-from backend.api.spoken import Spoken
 from backend.api.station import adapters as routes_adapters
 from backend.api.station import description as routes_description
 from backend.api.station import doctor as routes_doctor
@@ -59,7 +59,7 @@ from backend.scene.feed import SceneFeed
 from backend.station.bench import Bench
 from backend.station.recording.rerun_feed import RerunFeed
 from backend.station.recording.service import Recordings
-from drivers.computer import scheduling
+from drivers.computer.timing import scheduling
 from drivers.texts.message import language, text
 
 PREFIX = "/api/v1"

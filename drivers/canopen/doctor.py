@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from drivers.canopen.channel import SdoChannel
-from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.adapters.port import CanPort
+from drivers.canopen.exchange.cyclic import CanopenCyclic
+from drivers.canopen.exchange.pdo import INVALID
 from drivers.canopen.frames import EMERGENCY, HEARTBEAT, SDO_ANSWER, Frame
 from drivers.canopen.nodes import NodeRecord, NodeWatch
-from drivers.canopen.pdo import INVALID
-from drivers.canopen.port import CanPort
-from drivers.canopen.scanning import probe
+from drivers.canopen.sdo.channel import SdoChannel
+from drivers.canopen.sdo.scanning import probe
 from drivers.canopen.url import CanUrl
 from drivers.dialect import dialect_of
 from drivers.doctor.can_evidence import BusFacts, CanEvidence

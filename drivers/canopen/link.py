@@ -1,7 +1,7 @@
 """CANopen as a `drivers.link.Link` on any adapter supported by python-can.
 
 SDO transfers are implemented here instead of using ``canopen.SdoClient``, which has no lock and
-takes a late answer for the same object as the new one. `drivers.canopen.channel` excludes this.
+takes a late answer for the same object as the new one. `drivers.canopen.sdo.channel` excludes this.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from typing import TypeVar
 
 import can
 
-from drivers.canopen import sdo
-from drivers.canopen.adapter import open_bus
+from drivers.canopen.adapters.adapter import open_bus
+from drivers.canopen.adapters.port import CanPort
 from drivers.canopen.bus import BUS
-from drivers.canopen.channel import SdoChannel
-from drivers.canopen.cyclic import CanopenCyclic
 from drivers.canopen.doctor import Examiner
-from drivers.canopen.fixed_pdo import fixed_pdos
+from drivers.canopen.exchange.cyclic import CanopenCyclic
+from drivers.canopen.exchange.fixed_pdo import fixed_pdos
+from drivers.canopen.exchange.synchronous import LoopClock
 from drivers.canopen.frames import HEARTBEAT, SDO_ANSWER, SDO_REQUEST, Frame
 from drivers.canopen.lss.access import LssAccess
 from drivers.canopen.lss.codes import ANSWER as LSS_ANSWER
 from drivers.canopen.lss.codes import REQUEST as LSS_REQUEST
 from drivers.canopen.lss.master import LssMaster
 from drivers.canopen.nodes import NodeWatch
-from drivers.canopen.port import CanPort
-from drivers.canopen.scanning import identify, probe
-from drivers.canopen.synchronous import LoopClock
+from drivers.canopen.sdo import transfers as sdo
+from drivers.canopen.sdo.channel import SdoChannel
+from drivers.canopen.sdo.scanning import identify, probe
 from drivers.canopen.url import CanUrl, parse_canopen_url
 from drivers.cia402 import is_stop
 from drivers.codec import size_of

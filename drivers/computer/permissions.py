@@ -2,7 +2,8 @@
 
 SOEM opens a raw packet socket (CAP_NET_RAW) and switches the interface to promiscuous mode
 (CAP_NET_ADMIN): both are required. CAP_SYS_NICE and CAP_IPC_LOCK only improve the timing of cycles.
-Windows and macOS need a packet capture library instead: see `drivers.computer.packet_capture`.
+Windows and macOS need a packet capture library instead: see
+`drivers.computer.network.packet_capture`.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.computer.packet_capture import adapters, capture_state
-from drivers.computer.sockets import interface_flags
+from drivers.computer.network.packet_capture import adapters, capture_state
+from drivers.computer.network.sockets import interface_flags
 from drivers.texts.message import Text, joined, text
 
 NEEDED = {"CAP_NET_RAW": 13, "CAP_NET_ADMIN": 12}

@@ -12,7 +12,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.computer import permissions
-from drivers.computer.sockets import RAW_FRAMES
+from drivers.computer.network.sockets import RAW_FRAMES
 from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.doctor.diagnosis import Cause, diagnose
 from drivers.doctor.evidence import Evidence

@@ -1,4 +1,4 @@
-"""Decoding of the blocks that `drivers.computer.packet_ring` collects: pure, no I/O.
+"""Decoding of the blocks that `drivers.computer.network.packet_ring` collects: pure, no I/O.
 
 Source: ``include/uapi/linux/if_packet.h`` of Linux (TPACKET_V3); packet(7).
 """

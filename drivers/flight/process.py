@@ -20,7 +20,7 @@ import sys
 import threading
 import time
 
-from drivers.computer.packet_ring import CLOSED_S, PacketRing
+from drivers.computer.network.packet_ring import CLOSED_S, PacketRing
 from drivers.computer.processes import yield_processor
 from drivers.computer.signals import ignore_interrupt
 from drivers.flight.capture import frames_of_block

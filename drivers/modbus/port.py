@@ -16,7 +16,7 @@ from typing import Literal, Protocol
 import serial
 
 from drivers.adapters import ports_found, serial_device
-from drivers.computer.terminals import (
+from drivers.computer.serial_ports.terminals import (
     TERMINAL_ERRORS,
     Readiness,
     deliver_soon,

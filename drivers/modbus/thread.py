@@ -8,7 +8,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
-from drivers.computer.scheduling import fine_timers
+from drivers.computer.timing.scheduling import fine_timers
 
 T = TypeVar("T")
 

@@ -22,7 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from drivers.computer import scheduling
+from drivers.computer.timing import scheduling
 from drivers.errors import DriveError, why_of
 from drivers.texts.message import Text
 from drivers.texts.profile_errors import profile_error_text

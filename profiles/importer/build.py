@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from profiles.importer.description import DescribedEntry, Description
-from profiles.importer.esi import EsiDevice
+from profiles.importer.esi.esi import EsiDevice
 from profiles.importer.file_units import FileUnits
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import STANDARD, load_profile

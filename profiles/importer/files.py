@@ -12,8 +12,8 @@ from pathlib import Path
 import yaml
 
 from profiles.importer.build import ImportedProfile, build_profile
-from profiles.importer.eds import read_eds
-from profiles.importer.esi import EsiDevice, EsiFile, esi_devices, open_esi, read_device
+from profiles.importer.eds.eds import read_eds
+from profiles.importer.esi.esi import EsiDevice, EsiFile, esi_devices, open_esi, read_device
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import CLASS_FIELDS
 from profiles.replacing import move_into_place

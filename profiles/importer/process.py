@@ -17,7 +17,7 @@ from pathlib import Path
 
 from profiles.importer.build import ImportedProfile, build_profile
 from profiles.importer.description import Description
-from profiles.importer.esi import esi_devices, open_esi
+from profiles.importer.esi.esi import esi_devices, open_esi
 from profiles.importer.files import import_file, is_xml, write_profile
 from profiles.importer.report import ImportFailed, ImportReport
 from profiles.loader import ProfileError, drive_names, load_profile

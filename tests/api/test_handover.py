@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from backend.api.handover import routes
+from backend.api.records.handover import routes
 from backend.cli import app
 from backend.records.handover.read import MAX_BYTES
 from backend.station.demo import DemoBench

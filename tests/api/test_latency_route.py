@@ -9,7 +9,7 @@ import pytest
 
 from backend.api.station import adapters as routes
 from backend.foundation.preflight.adapters import Adapters
-from drivers.computer.latency_timer import LatencyTimers
+from drivers.computer.serial_ports.latency_timer import LatencyTimers
 from tests.support.station import Station
 from tests.unit.preflight.test_latency_list import OnePort
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.computer.sockets import hold_name
+from drivers.computer.network.sockets import hold_name
 from drivers.virtual.wires.netns import Namespace, unavailable
 from tests.support.station import Station
 

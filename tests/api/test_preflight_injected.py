@@ -25,7 +25,7 @@ NAMES = ("net_raw", "net_admin", "sys_nice", "ipc_lock")
 LOOK = """\
 import json, resource, sys
 from backend.foundation.preflight.findings import findings
-from drivers.computer.host_facts import Computer
+from drivers.computer.timing.host_facts import Computer
 for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
     resource.setrlimit(limit, (0, 0))
 print(json.dumps([one.code for one in findings(Computer().facts(sys.argv[1]))]))
@@ -37,7 +37,7 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_one:
     fcntl.ioctl(any_one, 0x8916, struct.pack(
         "16sHH4s8x", b"ec0m", socket.AF_INET, 0, socket.inet_aton("198.51.100.1")))
 """
-GROUPED = "from drivers.computer.ethtool import write_card; write_card('ec0m', 'gro', {})"
+GROUPED = "from drivers.computer.network.ethtool import write_card; write_card('ec0m', 'gro', {})"
 LINK = "from drivers.virtual.wires.netns import set_up; set_up('ec0m', {})"
 
 pytestmark = pytest.mark.skipif(bool(MISSING), reason=MISSING)

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from backend.api.station.box import routes
 from backend.foundation.people.station import People
 from backend.station.install.box.kept import Box, read
-from drivers.computer.interfaces import Interface
+from drivers.computer.network.interfaces import Interface
 from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
 from tests.support.guarded import CHEAP, PASSWORD
 from tests.support.station import Station

@@ -18,7 +18,7 @@ import pytest
 
 from backend.station.bench import Bench
 from drivers.adapters import require_channel, require_serial_form, serial_device
-from drivers.canopen.adapter import open_bus
+from drivers.canopen.adapters.adapter import open_bus
 from drivers.canopen.url import CanUrl
 from drivers.errors import DriveError, LinkLost, OutOfRange
 from drivers.modbus.port import LineSettings, open_port

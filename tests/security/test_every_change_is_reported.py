@@ -1,7 +1,7 @@
 """Every route and message that changes something leaves its line in the audit: who, what, values.
 
-Routes show it in one of two ways (see `backend.api.audit.audited`): where it happens, which is
-asked of each of them here with a real request, or by the wrapper around all routes, which is
+Routes show it in one of two ways (see `backend.api.records.audit.audited`): where it happens, which
+is asked of each of them here with a real request, or by the wrapper around all routes, which is
 asked with every route that there is.
 """
 
@@ -16,8 +16,8 @@ from typing import Any
 
 import pytest
 
-from backend.api.audit.audited import CHANGES_NOTHING, REPORTED_THERE, AuditedAnswers
-from backend.api.models import JobInfo
+from backend.api.messages.models import JobInfo
+from backend.api.records.audit.audited import CHANGES_NOTHING, REPORTED_THERE, AuditedAnswers
 from backend.api.security.rights import API, ROUTES
 from backend.foundation.people.rights import Role
 from backend.records.audit import Fact

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from drivers.computer.host_facts import Computer
+from drivers.computer.timing.host_facts import Computer
 
 #: linux/capability.h: NET_ADMIN 12, NET_RAW 13, IPC_LOCK 14, SYS_NICE 23.
 ALL = 1 << 12 | 1 << 13 | 1 << 14 | 1 << 23

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from backend.api.errors import problem_of
+from backend.api.messages.errors import problem_of
 from drivers.errors import (
     DriveError,
     LinkLost,

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.api.errors import problem_of
+from backend.api.messages.errors import problem_of
 from drivers.errors import DriveError, OutOfRange
 from drivers.ethercat.process.protocol import error_from_wire, error_to_wire
 from drivers.texts import limits

@@ -49,15 +49,15 @@ _PYSERIAL = "pyserial gives some errors of the system as nothing but its own tex
 #: nothing but its text or number, or words that are shown and nothing else.
 ALLOWED: dict[tuple[str, str], str] = {
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         "if error.args[0] == errno.EINTR:",
     ): "termios.error carries its number as its first argument only",
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         "windows = _WIN_ERROR.search(text)",
     ): _PYSERIAL,
     (
-        "drivers/computer/terminals.py",
+        "drivers/computer/serial_ports/terminals.py",
         'posix = re.search(r"\\[Errno (\\d+)\\]", text)',
     ): _PYSERIAL,
     (
@@ -66,7 +66,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ): _PYSERIAL,
     ("drivers/modbus/port.py", 'if number == errno.EINVAL or "baud" in text:'): _PYSERIAL,
     (
-        "drivers/canopen/adapter.py",
+        "drivers/canopen/adapters/adapter.py",
         'if code == errno.EAFNOSUPPORT or "AF_CAN" in words:',
     ): "Python without SocketCAN raises AttributeError or OSError without a number",
     (

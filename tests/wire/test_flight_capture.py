@@ -15,8 +15,8 @@ from drivers.virtual.wires.netns import Namespace, unavailable
 #: What every script has: a capture on ec0m, ``play(interface, frames)`` and ``held()``.
 _BEGIN = """
 import json, socket, sys, time
-from drivers.computer.sockets import interface_flags, set_interface_flags
-from drivers.computer.packet_ring import CLOSED_S, PacketRing
+from drivers.computer.network.sockets import interface_flags, set_interface_flags
+from drivers.computer.network.packet_ring import CLOSED_S, PacketRing
 from drivers.flight.capture import frames_of_block
 
 def frame(kind, number, size=60):

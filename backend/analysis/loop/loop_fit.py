@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from backend.analysis.mechanics.mechanical_model import TURN
-from backend.analysis.response.sampled_model import LoopModel
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampled_model import LoopModel
+from backend.analysis.response.signal_path.sampling import (
     DIRECT_SHARE,
     SignalPath,
     delay_response,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.loop.notch import Notch
-from backend.analysis.response.sampling import delay_response, lag_response
+from backend.analysis.response.signal_path.sampling import delay_response, lag_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 
 TURN = 2.0 * np.pi

@@ -19,8 +19,8 @@ import numpy as np
 import scipy
 
 from backend.analysis.loop.notch import Notch
-from backend.analysis.response.sampled_model import LoopModel
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampled_model import LoopModel
+from backend.analysis.response.signal_path.sampling import (
     SignalPath,
     command_response,
     delay_response,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.signals.line_spectra import (
     LineSpectra,

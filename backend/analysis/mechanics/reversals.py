@@ -15,8 +15,13 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from backend.analysis.response.sampled_model import SampledFit
-from backend.analysis.response.sampling import STEP_LEAD_S, SignalPath, delay_response, lag_response
+from backend.analysis.response.signal_path.sampled_model import SampledFit
+from backend.analysis.response.signal_path.sampling import (
+    STEP_LEAD_S,
+    SignalPath,
+    delay_response,
+    lag_response,
+)
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Quantity, Record, own_torque
 from backend.analysis.thresholds import reversals as threshold

@@ -14,7 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampling import SignalPath, delay_response, reported_response
+from backend.analysis.response.signal_path.sampling import (
+    SignalPath,
+    delay_response,
+    reported_response,
+)
 from backend.analysis.signals.arrays import (
     BoolArray,
     ComplexArray,

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.mechanics.friction import estimate_coulomb, scatter_left
-from backend.analysis.response.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
+from backend.analysis.response.signal_path.sampling import DIRECT_SHARE, MODEL_SHARE, SignalPath
 from backend.analysis.signals.arrays import (
     BoolArray,
     ComplexArray,

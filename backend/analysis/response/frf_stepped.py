@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.response.frf import Frf, valid_band_hz
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.line_spectra import (
     LineSpectra,
     Quantity,

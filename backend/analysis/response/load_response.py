@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from backend.analysis.response.frf import Frf, estimate_lines
-from backend.analysis.response.sampling import SignalPath, delay_response
+from backend.analysis.response.signal_path.sampling import SignalPath, delay_response
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.line_spectra import (
     Quantity,

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from backend.analysis.mechanics.model_fit import Solution
+from backend.analysis.mechanics.identification.model_fit import Solution
 from backend.analysis.response.frf import Frf, valid_band_hz
-from backend.analysis.response.sampling import DIRECT_SHARE, hold_response
+from backend.analysis.response.signal_path.sampling import DIRECT_SHARE, hold_response
 from backend.analysis.signals.arrays import ComplexArray, FloatArray, neighbour_mean
 from backend.analysis.thresholds import stated_band as threshold
 

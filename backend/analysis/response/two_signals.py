@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampled_model import SampledFit
-from backend.analysis.response.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.response.signal_path.sampled_model import SampledFit
+from backend.analysis.response.signal_path.sampling import SignalPath, delay_response, lag_response
 from backend.analysis.response.uncertainty import Uncertainty
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.thresholds import two_signals as threshold

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.mechanics.fit_problem import Problem, View, robust_rows
+from backend.analysis.mechanics.identification.fit_problem import Problem, View, robust_rows
 from backend.analysis.mechanics.mechanical_model import RIGID_PARAMETERS, TURN
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 

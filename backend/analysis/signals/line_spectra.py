@@ -1,7 +1,7 @@
 """Recordings as spectra on the excited lines, and the input that actually drove the axis.
 
 The torque between two bus cycles is reconstructed from the sent sequence, see
-:mod:`backend.analysis.response.sampling`. Periods with a lost cycle are left
+:mod:`backend.analysis.response.signal_path.sampling`. Periods with a lost cycle are left
 out, never interpolated.
 """
 
@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import scipy
 
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.sampling import (
     SignalPath,
     command_response,
     delay_response,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from backend.api.drive import models_axis
-from backend.api.errors import message_of, message_or_none, words_of
+from backend.api.messages.errors import message_of, message_or_none, words_of
 from backend.axes.axis.stop.facts import AxisStop, Verdict
 from backend.axes.stopping.stop_message import stop_message
 from backend.axes.stopping.turning import Turning

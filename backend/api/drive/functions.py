@@ -7,8 +7,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request
 
-from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive.models_functions import (
     AxisRecordInfo,
     BrakingInfo,
@@ -23,8 +21,10 @@ from backend.api.drive.models_functions import (
     WatchUpdate,
 )
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.errors import NotFound, message_of, message_or_none, words_of
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, message_of, message_or_none, words_of
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Controlled, TheBench, TheDrive
 from backend.axes.axis.axis import Envelope
 from backend.axes.axis.fault_history import PastFault, history_of, read_history
 from backend.axes.axis.remembered import AxisRecord, AxisStore

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.models import Message, Positive
+from backend.api.messages.models import Message, Positive
 from backend.axes.functions.regeneration import Verdict
 from backend.axes.scales.gear_calculator import Mechanics
 from backend.tools.wire_message import MessageInfo

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Finite, Message, Positive
+from backend.api.messages.models import Finite, Message, Positive
 
 #: Unit of travel in a motion request; speeds are then rpm, mm/s or °/s. mm and ° need mechanics.
 TravelName = Literal["rev", "mm", "°"]

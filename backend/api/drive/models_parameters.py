@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field, field_validator
 
-from backend.api.models import Message, Problem, Raw
+from backend.api.messages.models import Message, Problem, Raw
 from backend.tools.wire_message import MessageInfo
 from drivers.texts.message import Unsuitable, text
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path
 
-from backend.api.context import Me, TheBench, ThePeople
-from backend.api.errors import NotFound, message_or_none, words_of
-from backend.api.named_profile import profile_named
+from backend.api.messages.errors import NotFound, message_or_none, words_of
+from backend.api.requests.context import Me, TheBench, ThePeople
+from backend.api.requests.named_profile import profile_named
 from backend.api.security.gate import require_right
 from backend.api.station.models_description import PROFILE_NAME, MotionClass, MotionClassRequest
 from backend.foundation.people.rights import Right

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from backend.api import convert
-from backend.api.context import Controlled, Me, TheBench, ThePeople
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Controlled, Me, TheBench, ThePeople
 from backend.api.security.gate import require_right
 from backend.api.station.models import DriveSummary
 from backend.axes.motion.classes import motion_of

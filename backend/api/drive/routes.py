@@ -8,8 +8,6 @@ from collections.abc import Awaitable, Callable, Iterable
 
 from fastapi import APIRouter
 
-from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive import convert_motion
 from backend.api.drive.models_axis import (
     ActiveFault,
@@ -34,9 +32,11 @@ from backend.api.drive.models_parameters import (
     ReadAllRequest,
     WriteResult,
 )
-from backend.api.errors import NotFound, problem_of
-from backend.api.models import JobInfo
-from backend.api.sets.models import LoadSetRequest
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, problem_of
+from backend.api.messages.models import JobInfo
+from backend.api.records.sets.models import LoadSetRequest
+from backend.api.requests.context import Controlled, TheBench, TheDrive
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.readings import Reading
 from backend.axes.functions.assign import assign

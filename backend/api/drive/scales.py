@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from backend.api import convert
-from backend.api.context import Controlled, TheBench, TheDrive
 from backend.api.drive.models_scales import (
     ScaleInfo,
     ScalesInfo,
@@ -14,8 +12,10 @@ from backend.api.drive.models_scales import (
     SmallMovesInfo,
     TurnedUpdate,
 )
-from backend.api.errors import words_of
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import words_of
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Controlled, TheBench, TheDrive
 from backend.axes.axis import teaching
 from backend.axes.axis.restoring import shielded
 from backend.axes.drive.identity import read_serial

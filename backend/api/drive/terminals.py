@@ -7,8 +7,6 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
 
-from backend.api import convert
-from backend.api.context import Connection, Controlled, TheBench, TheDrive
 from backend.api.drive.models_functions import (
     ForcingInfo,
     ForcingStart,
@@ -19,7 +17,9 @@ from backend.api.drive.models_functions import (
     TerminalInfo,
 )
 from backend.api.drive.models_parameters import ParameterValue
-from backend.api.errors import NotFound
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound
+from backend.api.requests.context import Connection, Controlled, TheBench, TheDrive
 from backend.axes.drive import terminals as io_functions
 from backend.axes.drive.catalog import functions_of
 from backend.axes.drive.terminals import ProbeSettings, TerminalState

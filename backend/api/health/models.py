@@ -6,7 +6,7 @@ from datetime import datetime, time
 
 from pydantic import BaseModel, Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.tools.health.result import HealthValue, Quantity
 from backend.tools.trend.compare import Code, Direction
 from backend.tools.trend.permission import Cause, Outcome, Weekday

@@ -8,10 +8,6 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import TypeAdapter
 
-from backend.api import convert
-from backend.api.context import Controlled, Me, TheBench, TheDrive, ThePeople
-from backend.api.errors import message_of as as_info
-from backend.api.errors import message_or_none
 from backend.api.health.kept import records_of
 from backend.api.health.models import (
     AxisHealth,
@@ -24,7 +20,11 @@ from backend.api.health.models import (
     HealthRunInfo,
 )
 from backend.api.health.unattended import Unattended
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import message_of as as_info
+from backend.api.messages.errors import message_or_none
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.tools.health.result import UNITS
 from backend.tools.trend.compare import Finding
 from backend.tools.trend.permission import Attempt, Permission, next_due

@@ -19,7 +19,6 @@ from starlette.websockets import WebSocketState
 
 import backend
 from backend.api.drive.convert_stop import stop_result
-from backend.api.errors import message_of, problem_of, words_of
 from backend.api.live import news as live_news
 from backend.api.live.jog import Jogs
 from backend.api.live.messages import (
@@ -46,6 +45,7 @@ from backend.api.live.people import PeopleLive
 from backend.api.live.people_messages import PeopleRequest
 from backend.api.live.scope import ScopeStreams
 from backend.api.live.shared import Shared, only
+from backend.api.messages.errors import message_of, problem_of, words_of
 from backend.api.security.messages import require_message
 from backend.foundation.people.identity import Actor, Identity, acting, arrived_s
 from backend.foundation.people.station import People

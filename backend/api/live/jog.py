@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from backend.api.drive.convert_motion import jog_settings, unit_of
-from backend.api.errors import message_or_none, problem_of, words_of
 from backend.api.live.messages import JogEnded, JogGap, JogRenew, JogStart, ToPage
+from backend.api.messages.errors import message_or_none, problem_of, words_of
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive

@@ -7,12 +7,12 @@ from functools import partial
 
 from fastapi import WebSocket
 
-from backend.api import convert
 from backend.api.live import news as live_news
 from backend.api.live.connection import Connection
 from backend.api.live.messages import Logged
 from backend.api.live.people import PeopleLive
 from backend.api.live.shared import Shared
+from backend.api.messages import convert
 from backend.api.security.socket import OpenSockets
 from backend.axes.drive.readings import Reading
 from backend.foundation.people.identity import Actor, acting

@@ -24,7 +24,7 @@ from pydantic import BeforeValidator, Field, TypeAdapter
 from backend.api.drive.models_axis import AxisState, StopResult
 from backend.api.drive.models_parameters import ParameterValue
 from backend.api.live.people_messages import PeopleNews, PeopleRequest
-from backend.api.models import JobInfo, LogEntry, Message, Positive, Problem
+from backend.api.messages.models import JobInfo, LogEntry, Message, Positive, Problem
 from backend.api.station.models import DriveSummary
 from backend.tools.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from backend.api import convert
 from backend.api.live.messages import DrivesChanged, JobChanged, StateChanged, ToPage, ValuesChanged
+from backend.api.messages import convert
 from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
 from backend.station.drives.monitor import Snapshot

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.foundation.people.rights import Right, Role
 from backend.tools.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import UTC, datetime
 
-from backend.api.errors import message_or_none, words_of
 from backend.api.live.page import Page
 from backend.api.live.people_messages import (
     ChatLine,
@@ -14,6 +13,7 @@ from backend.api.live.people_messages import (
     PeopleHere,
     PersonHere,
 )
+from backend.api.messages.errors import message_or_none, words_of
 from backend.foundation.people.elapsed import moment_of
 from backend.foundation.people.identity import Identity
 from backend.foundation.people.rights import Right

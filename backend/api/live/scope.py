@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 from fastapi import WebSocketDisconnect
 
-from backend.api.errors import problem_of
 from backend.api.live.messages import ScopeChannelInfo, ScopeInfo, ScopeStart, ScopeStop, ToPage
 from backend.api.live.scope_blocks import encode_block
+from backend.api.messages.errors import problem_of
 from backend.axes.scales.units import AxisUnits
 from backend.axes.scope.hub import Subscription
 from backend.axes.scope.units import axis_scale

@@ -6,7 +6,6 @@ from datetime import timedelta
 
 from fastapi import APIRouter, Response
 
-from backend.api.context import Me, ThePeople
 from backend.api.people.models import (
     AccountChange,
     AccountInfo,
@@ -16,6 +15,7 @@ from backend.api.people.models import (
     TokenInfo,
 )
 from backend.api.people.record import TheRecord
+from backend.api.requests.context import Me, ThePeople
 from backend.api.security.own_session import own_account, whose_sessions
 from backend.foundation.people.accounts import Accounts
 from backend.foundation.people.errors import NoSuchPerson

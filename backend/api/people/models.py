@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field
 
 from backend.api.live.people_messages import ChatLine, InvitationView, PersonHere
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.foundation.people.login.passwords import MAX_LENGTH
 from backend.foundation.people.rights import Right, Role
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from fastapi import Depends
 
-from backend.api.context import TheBench
+from backend.api.requests.context import TheBench
 from backend.foundation.work.journal import Level
 from backend.records.audit.facts import Action, Fact
 from backend.station.bench import Bench

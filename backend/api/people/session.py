@@ -6,10 +6,10 @@ import asyncio
 
 from fastapi import APIRouter, Request, Response
 
-from backend.api.context import Me, TheBench, ThePeople
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
 from backend.api.people.models import LogIn, PasswordChange, Session, SessionInfo, SetUp
 from backend.api.people.record import TheRecord
+from backend.api.requests.context import Me, TheBench, ThePeople
 from backend.api.security.gate import COOKIE, SECURE_COOKIE, credentials
 from backend.api.security.own_session import (
     address_of,

@@ -6,7 +6,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
 
-from backend.api.context import Me, ThePeople
 from backend.api.live.live import LiveHub
 from backend.api.live.people_messages import InvitationView
 from backend.api.live.people_views import chat_line
@@ -20,6 +19,7 @@ from backend.api.people.models import (
     Session,
 )
 from backend.api.people.record import TheRecord
+from backend.api.requests.context import Me, ThePeople
 from backend.api.security.gate import require_right
 from backend.api.security.own_session import address_of, with_cookie
 from backend.foundation.people.errors import Forbidden, NotLoggedIn

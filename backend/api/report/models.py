@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 
 
 class ReportRequest(Message):

@@ -9,12 +9,12 @@ from datetime import UTC, datetime
 
 from fastapi import APIRouter, Response
 
-from backend.api.context import TheBench, TheDrive
-from backend.api.disposition import disposition
-from backend.api.errors import NotFound
-from backend.api.handover.routes import handover_log
 from backend.api.health.kept import records_of
+from backend.api.messages.disposition import disposition
+from backend.api.messages.errors import NotFound
+from backend.api.records.handover.routes import handover_log
 from backend.api.report.models import ReportInfo, ReportRequest
+from backend.api.requests.context import TheBench, TheDrive
 from backend.api.tuning.measurements import change_log, measurement_head
 from backend.foundation.store.database import DatabaseFailed
 from backend.records.library.measurements import BadMeasurement, Head

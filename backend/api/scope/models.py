@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from backend.api.models import Finite, Message, Positive
+from backend.api.messages.models import Finite, Message, Positive
 from drivers.texts.message import Unsuitable, text
 
 TraceId = Annotated[str, Field(pattern=r"^[cm][0-9]{1,3}$")]

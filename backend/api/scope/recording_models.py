@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.tools.wire_message import MessageInfo
 
 ExportKind = Literal["csv", "csv_raw", "rrd", "mcap"]

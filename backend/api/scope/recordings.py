@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal, get_args
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import FileResponse
 
-from backend.api import convert
-from backend.api.errors import NotFound, message_or_none, words_of
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, message_or_none, words_of
+from backend.api.messages.models import JobInfo
 from backend.api.scope.recording_models import (
     ArmRequest,
     BundleInfo,

@@ -9,7 +9,7 @@ from pathlib import Path
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse
 
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
 from backend.records.recording.rerun_assets import FILES, ViewerAssets
 from backend.station.recording.rerun_feed import RerunFeed
 from drivers.errors import NotAllowed

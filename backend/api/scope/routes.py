@@ -8,9 +8,9 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request, Response
 from pydantic import ValidationError
 
-from backend.api import convert
-from backend.api.context import TheBench
-from backend.api.errors import NotFound
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound
+from backend.api.requests.context import TheBench
 from backend.api.scope.models import NamedSetup, ScopeSetup, SnapshotHeader, SnapshotInfo
 from backend.axes.scope.stored import (
     MAX_SNAPSHOT_BYTES,

@@ -17,7 +17,7 @@ from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from backend.api.admission.requests import Admission
-from backend.api.errors import (
+from backend.api.messages.errors import (
     TITLES,
     NotFound,
     WrongMethod,
@@ -27,7 +27,7 @@ from backend.api.errors import (
     problem_of,
     words_of,
 )
-from backend.api.models import Problem
+from backend.api.messages.models import Problem
 from backend.api.security.body import BodyRefused, MeasuredBody, framing, is_json
 from backend.api.security.origin import Addresses, header
 from backend.api.security.rights import Matched, Policy

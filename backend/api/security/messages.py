@@ -7,7 +7,7 @@ from typing import Literal
 from backend.api.live import messages as live
 from backend.api.live import people_messages as people_live
 from backend.api.live.control import require_control
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.api.security.gate import require_right
 from backend.foundation.people.errors import Forbidden
 from backend.foundation.people.identity import Identity

@@ -7,12 +7,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from backend.api.context import TheBench
+from backend.api.requests.context import TheBench
 from backend.api.station.models_preflight import LatencyRequest, LatencyTimerInfo
 from backend.foundation.preflight.adapters import LOWERED_MS, Adapters, most_reads
 from backend.station.bench import Bench
 from drivers.adapters import is_same_port, require_serial_form
-from drivers.computer.latency_timer import InForce
+from drivers.computer.serial_ports.latency_timer import InForce
 from drivers.errors import Busy
 from drivers.urls import serial_port_of
 

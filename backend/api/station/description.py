@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from backend.api import convert
-from backend.api.context import TheBench, TheDrive
-from backend.api.errors import message_of, words_of
-from backend.api.models import JobInfo
-from backend.api.named_profile import profile_files, profile_named
+from backend.api.messages import convert
+from backend.api.messages.errors import message_of, words_of
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import TheBench, TheDrive
+from backend.api.requests.named_profile import profile_files, profile_named
 from backend.api.station.models import ProfileMatch
 from backend.api.station.models_description import (
     PROFILE_NAME,
@@ -36,7 +36,7 @@ from drivers.texts.message import Text, text
 from drivers.texts.profile_words import translated
 from profiles import drive_names
 from profiles.importer import ImportFailed, export_eds, export_esi
-from profiles.importer.esi import MAX_BYTES
+from profiles.importer.esi.esi import MAX_BYTES
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.language.overlay import Language
 from profiles.loader import user_folder

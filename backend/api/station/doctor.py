@@ -6,10 +6,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from backend.api import convert
-from backend.api.context import Connection, TheBench
-from backend.api.errors import NotFound
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Connection, TheBench
 from backend.api.station.models_doctor import (
     DoctorCause,
     DoctorFact,

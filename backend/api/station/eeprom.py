@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api.context import Connection, TheBench
-from backend.api.named_profile import profile_named
+from backend.api.requests.context import Connection, TheBench
+from backend.api.requests.named_profile import profile_named
 from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
 from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
 from backend.axes.drive.identity import confirm_identity

@@ -8,10 +8,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api import convert
-from backend.api.context import Connection, Controlled, TheBench
-from backend.api.errors import NotFound, message_of, message_or_none, words_of
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, message_of, message_or_none, words_of
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import Connection, Controlled, TheBench
 from backend.api.station.models_ethercat import (
     AliasRequest,
     CountersRequest,

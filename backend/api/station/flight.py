@@ -6,8 +6,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from backend.api.context import TheBench
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
+from backend.api.requests.context import TheBench
 from backend.records.recording.flight import file_name
 from drivers.errors import NotAllowed
 

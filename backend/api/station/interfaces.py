@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from serial.tools import list_ports
 
-from backend.api.errors import message_or_none, words_of
+from backend.api.messages.errors import message_or_none, words_of
 from backend.api.station.models import Interfaces, NetworkInterface, SerialPort
-from drivers.computer.interfaces import Interface, network_interfaces
-from drivers.computer.terminals import may_open
+from drivers.computer.network.interfaces import Interface, network_interfaces
+from drivers.computer.serial_ports.terminals import may_open
 from drivers.texts.message import text
 
 

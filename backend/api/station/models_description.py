@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import ConfigDict, Field, model_validator
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.api.station.models import FoundDrive
 from backend.tools.wire_message import MessageInfo
 from drivers.texts.message import Unsuitable, text

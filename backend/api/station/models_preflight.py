@@ -6,10 +6,10 @@ from datetime import datetime
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.foundation.preflight.findings import Code, Fix
 from backend.foundation.preflight.verdicts import Grade, Purpose
-from drivers.computer.latency_timer import LATENCY_MS, InForce
+from drivers.computer.serial_ports.latency_timer import LATENCY_MS, InForce
 
 
 class PreflightRequest(Message):

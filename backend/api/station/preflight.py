@@ -8,9 +8,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from backend.api import convert
-from backend.api.context import TheBench
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.models import JobInfo
+from backend.api.requests.context import TheBench
 from backend.api.station.models_preflight import (
     FixRequest,
     PreflightFinding,
@@ -35,7 +35,7 @@ from backend.foundation.preflight.verdicts import Verdict
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.install.box.roles import require_not_office
-from drivers.computer.lateness import EDGES_US, Measured
+from drivers.computer.timing.lateness import EDGES_US, Measured
 from drivers.errors import Busy
 from drivers.texts.message import text
 

@@ -8,8 +8,12 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 import backend
-from backend.api import convert
-from backend.api.context import (
+from backend.api.drive.convert_stop import stop_result
+from backend.api.drive.models_axis import StopRequest, StopResult
+from backend.api.messages import convert
+from backend.api.messages.errors import NotFound, message_of, words_of
+from backend.api.messages.models import JobInfo, LogEntry
+from backend.api.requests.context import (
     Connection,
     Controlled,
     Me,
@@ -18,10 +22,6 @@ from backend.api.context import (
     ThePeople,
     member_of,
 )
-from backend.api.drive.convert_stop import stop_result
-from backend.api.drive.models_axis import StopRequest, StopResult
-from backend.api.errors import NotFound, message_of, words_of
-from backend.api.models import JobInfo, LogEntry
 from backend.api.security.gate import require_right
 from backend.api.station.interfaces import list_interfaces
 from backend.api.station.models import (

@@ -16,8 +16,8 @@ from backend.analysis.loop.margins import closed_from_open, sensitivity
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.loop.notch import Notch, RealisedNotch
 from backend.analysis.signals.arrays import magnitude_db, phase_deg
-from backend.api.context import Controlled, TheBench, TheDrive
-from backend.api.errors import message_or_none, words_of
+from backend.api.messages.errors import message_or_none, words_of
+from backend.api.requests.context import Controlled, TheBench, TheDrive
 from backend.api.tuning.measurements import change_log, measurement_head
 from backend.api.tuning.models import (
     CandidatesInfo,

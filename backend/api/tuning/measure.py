@@ -11,11 +11,11 @@ import numpy.typing as npt
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from backend.api import convert
-from backend.api.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.health.kept import keep_health
-from backend.api.models import JobInfo
+from backend.api.messages import convert
+from backend.api.messages.models import JobInfo
 from backend.api.report import routes as routes_report
+from backend.api.requests.context import Connection, Controlled, Me, TheBench, TheDrive, ThePeople
 from backend.api.scope.recordings import TheRecordings
 from backend.api.security.gate import require_right
 from backend.api.tuning import design as routes_design

@@ -8,9 +8,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from backend.api.context import Me, TheBench
-from backend.api.disposition import disposition
-from backend.api.errors import NotFound, message_of, words_of
+from backend.api.messages.disposition import disposition
+from backend.api.messages.errors import NotFound, message_of, words_of
+from backend.api.requests.context import Me, TheBench
 from backend.api.tuning.models import MeasurementContent, MeasurementInfo, SignatureRequest
 from backend.records.library.measurements import SUFFIX, BadMeasurement, Head, Measurement
 from backend.report.changes import ChangeLog

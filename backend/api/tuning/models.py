@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.tools.autotune.result import CandidateInfo
 from backend.tools.results import ToolOutcome
 from backend.tools.wire_message import MessageInfo

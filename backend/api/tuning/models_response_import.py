@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.records.response_import.units import InputUnit, OutputUnit
 
 

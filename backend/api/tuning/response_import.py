@@ -11,7 +11,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
-from backend.api.context import TheBench
+from backend.api.requests.context import TheBench
 from backend.api.tuning.measurements import info_of
 from backend.api.tuning.models import MeasurementInfo
 from backend.api.tuning.models_response_import import ImportQuery, RecordingPreview

@@ -18,7 +18,7 @@ from typing import TypeVar
 import httpx
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from backend.api.models import JobInfo, Problem
+from backend.api.messages.models import JobInfo, Problem
 from backend.api.station.models import Bus, DriveSummary, FoundDrive
 from backend.commands.base.session import show_progress
 from drivers.errors import DriveError, LinkLost, NotAllowed, ProtocolError

@@ -10,8 +10,8 @@ from pathlib import Path
 from urllib.parse import quote
 
 from backend.api.drive.models_parameters import ParameterRow, ParameterValue
-from backend.api.library.models import StoredSet
-from backend.api.sets.models import Diff
+from backend.api.records.library.models import StoredSet
+from backend.api.records.sets.models import Diff
 from backend.api.station.models import DriveSummary, FoundDrive
 from backend.axes.parameters.set_file import parse
 from backend.commands.base.options import Place

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from backend.api.health.models import HealthAttempt, HealthPermissionInfo
-from backend.api.models import JobInfo
+from backend.api.messages.models import JobInfo
 from backend.commands.base.options import DEFAULT_SERVER, Json, Server
 from backend.commands.base.remote import Remote, remote
 from backend.commands.base.session import run

@@ -14,7 +14,7 @@ from backend.commands.base.session import reporting_errors
 from backend.commands.base.state import state_folder
 from backend.foundation.preflight.adapters import LOWERED_MS, Adapters, Timer, most_reads
 from drivers.adapters import require_serial_form
-from drivers.computer.latency_timer import InForce
+from drivers.computer.serial_ports.latency_timer import InForce
 
 
 @reporting_errors

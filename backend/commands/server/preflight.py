@@ -24,7 +24,7 @@ from backend.foundation.preflight.texts import (
     verdict_words,
     words,
 )
-from drivers.computer.lateness import EDGES_US, Histogram, Measured
+from drivers.computer.timing.lateness import EDGES_US, Histogram, Measured
 from drivers.errors import OutOfRange
 
 _BAR = 40

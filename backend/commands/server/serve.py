@@ -37,9 +37,9 @@ from backend.station.install.box.announced import announced
 from backend.station.install.box.kept import Box, names_of, read
 from backend.station.install.box.roles import addresses_of
 from backend.station.install.box.shown import phone_address, scan_code
-from drivers.computer import scheduling
+from drivers.computer.network.sockets import take_port_alone
 from drivers.computer.processes import raise_descriptors
-from drivers.computer.sockets import take_port_alone
+from drivers.computer.timing import scheduling
 from drivers.errors import Busy, NotAllowed
 from profiles import load_all
 from profiles.loader import ProfileError

@@ -19,7 +19,7 @@ from backend.station.install.box.kept import Box, keep, read
 from backend.station.install.box.roles import addresses_of, checked
 from backend.station.install.service import systemd_unit
 from backend.station.install.windows_task import windows_task
-from drivers.computer.interfaces import network_interfaces
+from drivers.computer.network.interfaces import network_interfaces
 
 app = typer.Typer(help="A station as a service.", no_args_is_help=True)
 

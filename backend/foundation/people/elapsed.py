@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 
-from drivers.computer.clock import elapsed_s
+from drivers.computer.timing.clock import elapsed_s
 
 __all__ = ["elapsed_s", "moment_of"]
 

@@ -16,7 +16,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from backend.foundation.store.files import write_atomically
-from drivers.computer.latency_timer import LATENCY_MS, InForce, LatencyTimer, LatencyTimers
+from drivers.computer.serial_ports.latency_timer import (
+    LATENCY_MS,
+    InForce,
+    LatencyTimer,
+    LatencyTimers,
+)
 from drivers.errors import Busy, DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import text
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 
-from drivers.computer.host_facts import HostFacts, Port
 from drivers.computer.permissions import NEEDED
+from drivers.computer.timing.host_facts import HostFacts, Port
 
 
 class Code(StrEnum):

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from backend.foundation.preflight.findings import Fix
-from drivers.computer.host_facts import HostFacts
-from drivers.computer.host_settings import HostSettings, Setting, affinity, command
+from drivers.computer.timing.host_facts import HostFacts
+from drivers.computer.timing.host_settings import HostSettings, Setting, affinity, command
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 from profiles.replacing import move_into_place

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from drivers.computer.lateness import Measured, from_json
+from drivers.computer.timing.lateness import Measured, from_json
 from profiles.replacing import move_into_place
 
 FILE = "preflight.json"

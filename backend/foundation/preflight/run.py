@@ -11,9 +11,9 @@ from backend.foundation.preflight.findings import Finding, findings
 from backend.foundation.preflight.verdicts import PERIODS_US, Verdict, verdicts
 from backend.foundation.work.child import run_child
 from drivers.adapters import require_interface
-from drivers.computer.host_facts import Computer, HostFacts
-from drivers.computer.lateness import Measured, from_json
-from drivers.computer.sockets import hold_name, require_linux
+from drivers.computer.network.sockets import hold_name, require_linux
+from drivers.computer.timing.host_facts import Computer, HostFacts
+from drivers.computer.timing.lateness import Measured, from_json
 from drivers.errors import Busy, LinkLost
 
 #: Callback with the progress of the measurement (0…1) and its period [µs].
@@ -87,7 +87,7 @@ async def _measured(period_us: int, seconds: float, interface: str) -> Measured:
             raise Busy("preflight.ethercat-master-servodeck-uses", interface=interface) from error
     with held or contextlib.nullcontext():
         answer = await run_child(
-            "drivers.computer.lateness",
+            "drivers.computer.timing.lateness",
             str(period_us),
             f"{seconds:g}",
             *([interface] if interface else []),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from backend.foundation.preflight.findings import Code, Effect, Finding
-from drivers.computer.lateness import Measured, missed_bound
+from drivers.computer.timing.lateness import Measured, missed_bound
 
 
 class Purpose(StrEnum):

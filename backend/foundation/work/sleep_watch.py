@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from drivers.computer.clock import elapsed_s
+from drivers.computer.timing.clock import elapsed_s
 
 #: Longer than a busy computer delays a program, shorter than the sleep of a computer [s].
 LONGEST_S = 5.0

@@ -25,7 +25,7 @@ from backend.records.handover.model import AxisHandover, MappedEntry, MappedPdo
 from backend.records.handover.xml_lists import child, file_of, init_command, init_commands, note
 from drivers.errors import NotAllowed
 from drivers.texts import limits
-from profiles.importer.esi_controller import SlaveController
+from profiles.importer.esi.controller import SlaveController
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _BRD, _BWR, _LRW, _ARMW = 7, 8, 12, 13

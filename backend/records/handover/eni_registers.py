@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 from backend.records.handover.model import AxisHandover
 from backend.records.handover.xml_lists import child
-from profiles.importer.esi_controller import SlaveController, SyncManager
+from profiles.importer.esi.controller import SlaveController, SyncManager
 
 #: Datagram commands (ETG.1000.4 clause 5.4).
 _APRD, _APWR, _FPRD, _FPWR = 1, 2, 4, 5

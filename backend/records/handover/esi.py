@@ -10,7 +10,7 @@ from drivers.errors import NotAllowed
 from drivers.texts.imports import failure_text, message_of_import
 from drivers.texts.message import Text
 from profiles.importer import ImportFailed
-from profiles.importer.esi_controller import (
+from profiles.importer.esi.controller import (
     NoController,
     SlaveController,
     SyncManager,

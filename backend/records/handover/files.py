@@ -13,7 +13,7 @@ from backend.records.handover.eni import eni, is_complete
 from backend.records.handover.model import AxisHandover
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
-from profiles.importer.esi_controller import SlaveController, Wanted
+from profiles.importer.esi.controller import SlaveController, Wanted
 
 Format = Literal["twincat", "codesys", "eni", "lcec", "ros2", "igh", "dcf", "csv", "python"]
 FORMATS: tuple[str, ...] = get_args(Format)

@@ -14,7 +14,7 @@ from backend.axes.parameters.set_file import ParameterSet
 from drivers.codec import encode, size_of
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import Text, joined, prose, text
-from profiles.importer.esi_controller import SlaveController
+from profiles.importer.esi.controller import SlaveController
 from profiles.schema import DataType, Parameter, Profile, Raw
 
 Transition = Literal["PS", "SO"]

@@ -11,7 +11,7 @@ from backend.analysis.loop.design import design
 from backend.analysis.loop.loop_goals import LoadClass
 from backend.analysis.loop.loop_structure import DriveLoops
 from backend.analysis.loop.measured_plant import measured_plant
-from backend.analysis.response.collocated import (
+from backend.analysis.response.foreign_recordings.collocated import (
     Contradiction,
     RigidPart,
     as_frf,
@@ -20,7 +20,11 @@ from backend.analysis.response.collocated import (
     path_delay_s,
     rigid_part,
 )
-from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
+from backend.analysis.response.foreign_recordings.foreign import (
+    ForeignResponse,
+    NoResponse,
+    evaluate,
+)
 from backend.analysis.signals.arrays import FloatArray
 from backend.records.response_import.contents import Table, read_table
 from backend.records.response_import.errors import BadRecording

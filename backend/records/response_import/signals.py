@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from backend.analysis.response.foreign import LEAST_SAMPLES
+from backend.analysis.response.foreign_recordings.foreign import LEAST_SAMPLES
 from backend.analysis.signals.arrays import FloatArray
 from backend.records.response_import.contents import Table
 from backend.records.response_import.errors import BadRecording

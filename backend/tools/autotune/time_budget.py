@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from backend.analysis.response.sampling import DIRECT_SHARE
+from backend.analysis.response.signal_path.sampling import DIRECT_SHARE
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.thresholds import autotune_time_budget as threshold
 from drivers.texts.message import Text, text

@@ -13,8 +13,8 @@ from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, Missed, judge
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.loop.notch import Notch
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.reference_path import ReferencePath, reference_paths
-from backend.analysis.response.sampling import Hold
+from backend.analysis.response.signal_path.reference_path import ReferencePath, reference_paths
+from backend.analysis.response.signal_path.sampling import Hold
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis
 from backend.tools.autotune import gains as gain_tool

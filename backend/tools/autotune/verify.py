@@ -15,7 +15,7 @@ from backend.analysis.loop.loop_verdict import LoopVerdict, Missed
 from backend.analysis.loop.margins import bandwidth, open_from_closed
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampling import Hold
+from backend.analysis.response.signal_path.sampling import Hold
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from backend.analysis.coupled.excitation import Experiment, orthogonal_multisines
 from backend.analysis.loop.loop_structure import LoopFilters
-from backend.analysis.response.sampling import lag_response
+from backend.analysis.response.signal_path.sampling import lag_response
 from backend.analysis.signals.excitation import choose_lines
 from backend.axes.axis.axis import Axis
 from backend.tools.autotune.axis_facts import AxisFacts, read_facts

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.mechanics.inertia import InertiaResult, Interval, estimate_inertia
+from backend.analysis.mechanics.slow_moves.inertia import InertiaResult, Interval, estimate_inertia
 from backend.analysis.signals.spectrum import power_density
 from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts

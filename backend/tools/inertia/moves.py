@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.tools.autotune.axis_facts import AxisFacts

@@ -11,7 +11,7 @@ import asyncio
 import contextlib
 from dataclasses import replace
 
-from backend.analysis.mechanics.inertia import InertiaResult
+from backend.analysis.mechanics.slow_moves.inertia import InertiaResult
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from backend.tools.jog.release import END_OF_JOG
 from backend.tools.thresholds import jog_hold as threshold
-from drivers.computer.clock import elapsed_s
+from drivers.computer.timing.clock import elapsed_s
 from drivers.texts.message import Text, text
 
 GAP_S = threshold.GAP_S

@@ -19,7 +19,7 @@ import numpy as np
 
 from backend.analysis.loop.notch import LevelCalibration, Notch
 from backend.analysis.loop.notch_effect import NotchEffect, fit_effect
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession

@@ -20,8 +20,8 @@ from backend.analysis.loop.loop_goals import sensitivity_peak, stable
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.loop.notch import Notch
 from backend.analysis.loop.notch_effect import LoopLines, NotchEffect, fit_effect_in_loop
-from backend.analysis.response.sampled_model import LoopModel
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampled_model import LoopModel
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession

@@ -8,16 +8,16 @@ from typing import Literal
 import numpy as np
 
 from backend.analysis.loop.margins import bandwidth, closed_from_open, margins, open_from_closed
-from backend.analysis.mechanics.fit_problem import KnownInertia
-from backend.analysis.mechanics.identify import Identification, identify_with_path
+from backend.analysis.mechanics.identification.fit_problem import KnownInertia
+from backend.analysis.mechanics.identification.identify import Identification, identify_with_path
+from backend.analysis.mechanics.identification.resonance_table import resonance_table
 from backend.analysis.mechanics.load_side_samples import unwrapped
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.mechanics.resonance import Resonance
-from backend.analysis.mechanics.resonance_table import resonance_table
 from backend.analysis.response.distortion import Detected
 from backend.analysis.response.frf import Frf, Quantity, Record, estimate_periodic
 from backend.analysis.response.load_response import load_response, scale_of
-from backend.analysis.response.reported import (
+from backend.analysis.response.reported_signals.reported import (
     charged,
     commanded,
     current_uncertainty,
@@ -25,8 +25,8 @@ from backend.analysis.response.reported import (
     path_uncertainty,
     slow_uncertainty,
 )
-from backend.analysis.response.reported_speed import with_position_speed
-from backend.analysis.response.sampling import (
+from backend.analysis.response.reported_signals.reported_speed import with_position_speed
+from backend.analysis.response.signal_path.sampling import (
     MODEL_SHARE,
     Hold,
     SignalPath,

@@ -13,9 +13,13 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.analysis.response.frf import Record, estimate_periodic
-from backend.analysis.response.reference_gain import ReferenceLoop, reference_gain
-from backend.analysis.response.sampled_model import SampledFit
-from backend.analysis.response.sampling import SignalPath, delay_response, rising_command
+from backend.analysis.response.signal_path.reference_gain import ReferenceLoop, reference_gain
+from backend.analysis.response.signal_path.sampled_model import SampledFit
+from backend.analysis.response.signal_path.sampling import (
+    SignalPath,
+    delay_response,
+    rising_command,
+)
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import good_periods, period_spectra
 from backend.tools.measuring import excite

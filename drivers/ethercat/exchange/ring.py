@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from drivers.computer.sockets import shared_memory_file
+from drivers.computer.network.sockets import shared_memory_file
 
 RING_BYTES = 16 << 20
 _PAGE = 4096

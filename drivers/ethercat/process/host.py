@@ -20,8 +20,9 @@ import time
 from collections import deque
 from pathlib import Path
 
-from drivers.computer import realtime, signals
+from drivers.computer import signals
 from drivers.computer.processes import end_within
+from drivers.computer.timing import realtime
 from drivers.errors import DriveError, LinkLost, ProtocolError
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.process import protocol

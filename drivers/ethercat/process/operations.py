@@ -9,7 +9,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.cia402 import State
-from drivers.computer.realtime import RealTime
+from drivers.computer.timing.realtime import RealTime
 from drivers.dictionary import ObjectInfo
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat.exchange.cyclic import CyclicLoop

@@ -12,7 +12,7 @@ import contextlib
 import socket
 import struct
 
-from drivers.computer.sockets import interface_flags, set_interface_flags
+from drivers.computer.network.sockets import interface_flags, set_interface_flags
 
 _IFF_PROMISC = 0x100
 _SOL_PACKET, _ADD_MEMBERSHIP, _MR_PROMISC = 263, 1, 1

@@ -20,8 +20,8 @@ from pathlib import Path
 
 import platformdirs
 
-from drivers.computer.clock import resolution_s
-from drivers.computer.lateness import EDGES_US, Histogram, missed_bound
+from drivers.computer.timing.clock import resolution_s
+from drivers.computer.timing.lateness import EDGES_US, Histogram, missed_bound
 from drivers.errors import NotAllowed
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.wire.lanes import Wire

@@ -26,8 +26,9 @@ from typing import BinaryIO
 import pysoem
 
 from drivers.adapters import require_ethercat_adapter
-from drivers.computer import packet_capture, permissions
-from drivers.computer.sockets import (
+from drivers.computer import permissions
+from drivers.computer.network import packet_capture
+from drivers.computer.network.sockets import (
     MSG_DONTWAIT,
     RAW_FRAMES,
     hold_name,

@@ -13,8 +13,8 @@ from typing import Protocol
 
 import can
 
+from drivers.canopen.adapters.slcan import ERROR_BUS_OFF
 from drivers.canopen.frames import Frame, exact_bits
-from drivers.canopen.slcan import ERROR_BUS_OFF
 from drivers.virtual.wires.canopen import CanopenNode
 
 _LONGEST_WAIT_S = 0.002

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from drivers.codec import size_of
-from drivers.computer.scheduling import fine_timers
+from drivers.computer.timing.scheduling import fine_timers
 from drivers.errors import NotAllowed
 from drivers.mlink.link import register_of
 from drivers.modbus.framing import (

@@ -21,14 +21,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
-from drivers.computer import scheduling
-from drivers.computer.namespaces import (
+from drivers.computer.network.namespaces import (
     AVAILABLE,
     disable_ipv6,
     enter_namespaces,
     leave_namespaces,
 )
-from drivers.computer.sockets import AF_NETLINK, NETLINK_ROUTE
+from drivers.computer.network.sockets import AF_NETLINK, NETLINK_ROUTE
+from drivers.computer.timing import scheduling
 from drivers.texts.message import Unsuitable, prose, text
 
 _RTM_NEWLINK = 16

@@ -14,8 +14,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.computer.sockets import set_blocking
-from drivers.computer.terminals import (
+from drivers.computer.network.sockets import set_blocking
+from drivers.computer.serial_ports.terminals import (
     open_pair,
     output_speed,
     require_pseudo_terminals,

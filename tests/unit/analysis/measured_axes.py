@@ -9,7 +9,7 @@ import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Quantity, Record
 

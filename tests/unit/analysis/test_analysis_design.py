@@ -15,7 +15,7 @@ from backend.analysis.loop.loop_structure import DriveLoops, step_of_closed_loop
 from backend.analysis.loop.margins import margins
 from backend.analysis.loop.measured_plant import MeasuredPlant, measured_plant
 from backend.analysis.loop.notch import coefficients_response, encode_coefficients
-from backend.analysis.mechanics.identify import identify_mechanics
+from backend.analysis.mechanics.identification.identify import identify_mechanics
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 
 LOOPS = DriveLoops(1000.0, 50e-6)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.mechanics.identify import identify_with_path
+from backend.analysis.mechanics.identification.identify import identify_with_path
 from backend.analysis.response.distortion import distortion
 from backend.analysis.response.frf import estimate_periodic
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record, speed_lag_s
 

@@ -7,10 +7,14 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 from measured_axes import HEAVY, NAMED, ONE, RIGID, STIFF, THREE, TWO, VERTICAL, errors, measure
 
-from backend.analysis.mechanics.identify import identify_mechanics
+from backend.analysis.mechanics.identification.identify import identify_mechanics
 from backend.analysis.response.frf import estimate_periodic, valid_band_hz
 from backend.analysis.response.frf_stepped import estimate_stepped
-from backend.analysis.response.sampling import SignalPath, hold_response, sampled_command
+from backend.analysis.response.signal_path.sampling import (
+    SignalPath,
+    hold_response,
+    sampled_command,
+)
 from backend.analysis.signals.chirp import chirp
 from backend.analysis.signals.excitation import choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from backend.analysis.mechanics.friction import estimate_coulomb
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.line_spectra import LineSpectra, continuous_input, friction_input
 
 PATH = SignalPath(1000.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
-from backend.analysis.mechanics.inertia import estimate_inertia
+from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.slow_moves.inertia import estimate_inertia
 
 MOTOR = 5e-5
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from backend.analysis.loop.measured_plant import measured_plant
-from backend.analysis.mechanics.fit_problem import CHAIN, MODAL, KnownInertia
+from backend.analysis.mechanics.identification.fit_problem import CHAIN, MODAL, KnownInertia
+from backend.analysis.mechanics.identification.model_fit import fit_sampled_model
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
-from backend.analysis.mechanics.model_fit import fit_sampled_model
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampled_model import LoopModel, seen_response
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampled_model import LoopModel, seen_response
+from backend.analysis.response.signal_path.sampling import SignalPath
 
 MOTOR, LOAD = 7e-5, 1.27e-4
 #: Antiresonance at 9.3 Hz, resonance at 15.6 Hz.

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from drive_sim import TURN, Drive, Mechanics, simulate
 
-from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
-from backend.analysis.mechanics.inertia import (
+from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.slow_moves.inertia import (
     _columns,
     _smooth,
     _smoothing_kernel,
     _swinging_variance,
     estimate_inertia,
 )
-from backend.analysis.mechanics.load_swing import Swing, find_swings, lag_of_load
+from backend.analysis.mechanics.slow_moves.load_swing import Swing, find_swings, lag_of_load
 
 RATE = 1000.0
 RATED_NM = 1.27

@@ -6,8 +6,8 @@ Torque is worked out from the moves themselves (inverse dynamics), which has no 
 import numpy as np
 import pytest
 
-from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
-from backend.analysis.mechanics.inertia import estimate_inertia
+from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.slow_moves.inertia import estimate_inertia
 
 TURN = 2 * np.pi
 RATE = 1000.0

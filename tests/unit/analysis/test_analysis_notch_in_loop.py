@@ -16,8 +16,8 @@ from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.loop.notch import Notch
 from backend.analysis.loop.notch_effect import LoopLines, fit_effect_in_loop
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
-from backend.analysis.response.sampled_model import LoopModel
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampled_model import LoopModel
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.tools.notch.in_loop import safe_centre_hz
 
 TURN = 2 * np.pi

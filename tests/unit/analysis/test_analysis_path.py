@@ -9,18 +9,22 @@ from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from backend.analysis.mechanics import identification_trials
-from backend.analysis.mechanics.identification_trials import Task
-from backend.analysis.mechanics.identify import (
+from backend.analysis.mechanics.identification import identification_trials
+from backend.analysis.mechanics.identification.identification_trials import Task
+from backend.analysis.mechanics.identification.identify import (
     Identification,
     _undecided,
     _without_path,
     identify_with_path,
 )
-from backend.analysis.mechanics.robust_fit import minimise
+from backend.analysis.mechanics.identification.robust_fit import minimise
 from backend.analysis.response.frf import estimate_periodic
-from backend.analysis.response.path_fit import find_paths, moved_path
-from backend.analysis.response.sampling import SignalPath, sampled_command, sampled_command_response
+from backend.analysis.response.signal_path.path_fit import find_paths, moved_path
+from backend.analysis.response.signal_path.sampling import (
+    SignalPath,
+    sampled_command,
+    sampled_command_response,
+)
 from backend.analysis.response.stated_band import unexplained
 from backend.analysis.signals.line_spectra import Record
 

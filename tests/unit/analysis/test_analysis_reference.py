@@ -9,8 +9,8 @@ from random_axes import errors
 from test_analysis_path import case_of, records_of
 
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.reference_gain import reference_gain
-from backend.analysis.response.sampling import (
+from backend.analysis.response.signal_path.reference_gain import reference_gain
+from backend.analysis.response.signal_path.sampling import (
     SignalPath,
     rising_command,
     sampled_command,

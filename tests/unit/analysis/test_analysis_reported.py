@@ -10,10 +10,14 @@ from measured_axes import ONE, tuned_drive
 from random_axes import errors
 from scipy.signal import butter, lfilter
 
-from backend.analysis.mechanics.identify import identify_with_path
-from backend.analysis.response.reported import commanded, current_uncertainty, mean_cycles
-from backend.analysis.response.reported_speed import derivative
-from backend.analysis.response.sampling import SignalPath, lag_response
+from backend.analysis.mechanics.identification.identify import identify_with_path
+from backend.analysis.response.reported_signals.reported import (
+    commanded,
+    current_uncertainty,
+    mean_cycles,
+)
+from backend.analysis.response.reported_signals.reported_speed import derivative
+from backend.analysis.response.signal_path.sampling import SignalPath, lag_response
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
 from backend.axes.axis.axis import Envelope

@@ -7,15 +7,18 @@ import pytest
 from drive_sim import TURN, Drive, Mechanics
 from random_axes import ENVELOPE, RATED_NM, Case, errors, facts_of, played
 
-from backend.analysis.mechanics import identification_trials
-from backend.analysis.mechanics.fit_problem import CHAIN, Problem, View
+from backend.analysis.mechanics.identification import identification_trials
+from backend.analysis.mechanics.identification.fit_problem import CHAIN, Problem, View
+from backend.analysis.mechanics.identification.mode_uncertainty import (
+    ModeUncertainty,
+    mode_uncertainties,
+)
+from backend.analysis.mechanics.identification.resonance_table import resonance_table
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
-from backend.analysis.mechanics.mode_uncertainty import ModeUncertainty, mode_uncertainties
 from backend.analysis.mechanics.resonance import Resonance
-from backend.analysis.mechanics.resonance_table import resonance_table
 from backend.analysis.response.frf import Frf
-from backend.analysis.response.sampled_model import LoopModel, seen_response
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampled_model import LoopModel, seen_response
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.line_spectra import Record, collect
 from backend.tools.sweep.evaluation import SweepSettings, evaluate
 

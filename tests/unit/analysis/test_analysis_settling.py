@@ -6,7 +6,7 @@ from drive_sim import TURN, Drive, Mechanics
 from random_axes import RATED_NM, Case, errors, played, result_of
 
 from backend.analysis.response.frf import estimate_periodic
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.excitation import choose_lines, multisine
 from backend.analysis.signals.line_spectra import Record
 from backend.analysis.signals.transient_removal import settled

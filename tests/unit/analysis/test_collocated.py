@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.analysis.response.collocated import contradiction
-from backend.analysis.response.foreign import ForeignResponse
-from backend.analysis.response.repeat_band import RepeatBand
+from backend.analysis.response.foreign_recordings.collocated import contradiction
+from backend.analysis.response.foreign_recordings.foreign import ForeignResponse
+from backend.analysis.response.foreign_recordings.repeat_band import RepeatBand
 
 F = np.arange(10.0, 110.0)
 

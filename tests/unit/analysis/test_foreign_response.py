@@ -10,8 +10,12 @@ import numpy as np
 import pytest
 from scipy.signal import chirp, cont2discrete, lfilter
 
-from backend.analysis.response.excitation_found import find_excitation
-from backend.analysis.response.foreign import ForeignResponse, NoResponse, evaluate
+from backend.analysis.response.foreign_recordings.excitation_found import find_excitation
+from backend.analysis.response.foreign_recordings.foreign import (
+    ForeignResponse,
+    NoResponse,
+    evaluate,
+)
 from tests.support.two_masses import Bench, multisine
 
 RATE = 2500.0

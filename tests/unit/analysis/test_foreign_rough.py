@@ -13,9 +13,17 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import lfilter, ss2tf
 
-from backend.analysis.response.collocated import contradiction, path_delay_s, rigid_part
-from backend.analysis.response.foreign import ForeignResponse, evaluate
-from backend.analysis.response.product_model import Pair, ProductFit, ProductModel
+from backend.analysis.response.foreign_recordings.collocated import (
+    contradiction,
+    path_delay_s,
+    rigid_part,
+)
+from backend.analysis.response.foreign_recordings.foreign import ForeignResponse, evaluate
+from backend.analysis.response.foreign_recordings.product_model import (
+    Pair,
+    ProductFit,
+    ProductModel,
+)
 
 MOTOR, LOAD = 8e-4, 1.5e-3
 STIFF = LOAD * (2 * np.pi * 45.0) ** 2

@@ -8,8 +8,11 @@ import numba
 import numpy as np
 import pytest
 
-from backend.analysis.mechanics.inertia_by_place import InertiaByPlace, inertia_by_place
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.mechanics.identification.inertia_by_place import (
+    InertiaByPlace,
+    inertia_by_place,
+)
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.excitation import BaseMotion, multisine
 from backend.analysis.signals.line_spectra import Record
 

@@ -11,8 +11,8 @@ import pytest
 
 from backend.analysis.loop.loop_goals import Goals, each_of, worst_of
 from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, excluding_db, judge
-from backend.analysis.response.reference_path import reference_paths
-from backend.analysis.response.sampling import hold_response
+from backend.analysis.response.signal_path.reference_path import reference_paths
+from backend.analysis.response.signal_path.sampling import hold_response
 
 DENSE = np.geomspace(1.0, 6000.0, 3000)
 PROMISED = Goals(9.0, 48.0, 1.8)

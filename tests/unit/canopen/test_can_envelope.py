@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.exchange.cyclic import CanopenCyclic
 from drivers.canopen.url import parse_canopen_url
 from drivers.errors import OutOfRange
 from drivers.ethercat.exchange.trajectory import message_of

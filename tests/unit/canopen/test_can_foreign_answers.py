@@ -9,12 +9,12 @@ from typing import Any
 import can
 import pytest
 
-from drivers.canopen import sdo
-from drivers.canopen.channel import SdoChannel
 from drivers.canopen.frames import Frame
 from drivers.canopen.link import CanopenLink
 from drivers.canopen.nodes import NodeWatch, emergency_text
-from drivers.canopen.scanning import probe
+from drivers.canopen.sdo import transfers as sdo
+from drivers.canopen.sdo.channel import SdoChannel
+from drivers.canopen.sdo.scanning import probe
 from drivers.errors import LinkLost, LinkTimeout, ProtocolError
 
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from drivers.canopen.cyclic import CanopenCyclic
-from drivers.canopen.drive_setup import DriveSetup
-from drivers.canopen.fixed_pdo import FixedPdo
+from drivers.canopen.exchange.cyclic import CanopenCyclic
+from drivers.canopen.exchange.drive_setup import DriveSetup
+from drivers.canopen.exchange.fixed_pdo import FixedPdo
+from drivers.canopen.exchange.pdo import PdoPlan
 from drivers.canopen.frames import NMT_START, Frame
-from drivers.canopen.pdo import PdoPlan
 from drivers.canopen.url import parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, Rejected
 from drivers.link import Address, CyclicSignal

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.canopen.fixed_pdo import fixed_pdos
+from drivers.canopen.exchange.fixed_pdo import fixed_pdos
 from drivers.canopen.link import CanopenLink
 from profiles import load_profile
 from profiles.schema import PdoIdentifier, PdoSet, PdoSpec, Profile

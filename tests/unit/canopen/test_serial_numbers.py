@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.canopen.scanning import identify
+from drivers.canopen.sdo.scanning import identify
 from drivers.ethercat.wire import sii
 from drivers.mlink.link import MlinkLayout
 

@@ -9,15 +9,15 @@ from types import SimpleNamespace
 
 import pytest
 
-from drivers.computer import latency_timer
 from drivers.computer import registry as registry_module
-from drivers.computer.latency_timer import (
+from drivers.computer.registry import REGISTRY
+from drivers.computer.serial_ports import latency_timer
+from drivers.computer.serial_ports.latency_timer import (
     InForce,
     LatencyTimer,
     LatencyTimers,
     restart_device,
 )
-from drivers.computer.registry import REGISTRY
 from tests.support.registry import ENUM, PARAMETERS, Hive, winreg
 
 SINGLE = r"FTDIBUS\VID_0403+PID_6001+A50285BIA\0000"

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.adapters import require_ethercat_adapter
 from drivers.computer.locks import hold_file
-from drivers.computer.packet_capture import (
+from drivers.computer.network.packet_capture import (
     Capture,
     adapters,
     bpf_state,

@@ -10,7 +10,7 @@ import pytest
 from importer_samples import GOOD_EDS, ODD_EDS, facts, with_object
 
 from profiles.importer import ImportFailed, export_eds, import_file, write_profile
-from profiles.importer.eds import MAX_BYTES
+from profiles.importer.eds.eds import MAX_BYTES
 from profiles.loader import load_profile, parse_profile
 
 

@@ -7,7 +7,7 @@ from importer_samples import GOOD_ESI, facts
 
 from profiles.importer import ImportFailed, ImportReport, build_profile, import_file
 from profiles.importer.dictionary import DictionaryEntry, describe_dictionary
-from profiles.importer.esi import MAX_BYTES, esi_devices, open_esi
+from profiles.importer.esi.esi import MAX_BYTES, esi_devices, open_esi
 from profiles.importer.values import unit_of_code
 
 

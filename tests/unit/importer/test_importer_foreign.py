@@ -20,7 +20,7 @@ from profiles.importer import (
     read_dcf_values,
 )
 from profiles.importer.dictionary import DictionaryEntry
-from profiles.importer.esi_controller import read_controllers
+from profiles.importer.esi.controller import read_controllers
 from profiles.loader import load_profile
 
 REAL = """

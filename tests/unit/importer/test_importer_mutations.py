@@ -22,7 +22,7 @@ from drivers.errors import DriveError, OutOfRange
 from drivers.ethercat.eeprom.image import Image, differences
 from drivers.ethercat.eeprom.plan import plan_restore
 from drivers.texts.imports import failure_text, finding_line
-from drivers.virtual.wires.ethercat.sii import SiiContent, SmLayout, build
+from drivers.virtual.wires.ethercat.controller.sii import SiiContent, SmLayout, build
 from profiles import load_profile
 from profiles.importer import ImportFailed, export_dcf, import_file
 from profiles.schema import INTEGER_RANGE, Raw

@@ -14,7 +14,7 @@ from backend.axes.parameters.set_file import BadSet
 from backend.records.handover.esi import controller_of, reported_controllers
 from backend.station.drives.description import BadDescription, Work, import_in_process
 from drivers.errors import NotAllowed
-from profiles.importer.esi_controller import ControllersTask
+from profiles.importer.esi.controller import ControllersTask
 from profiles.importer.process import DevicesTask, FileTask
 from profiles.loader import ProfileError, broken_profiles, load_all, load_profile
 

@@ -11,7 +11,7 @@ import pytest
 
 from profiles.check import check
 from profiles.importer import ImportedProfile, ImportFailed, ImportReport, import_file
-from profiles.importer.dcf import read_dcf_values
+from profiles.importer.eds.dcf import read_dcf_values
 from profiles.schema import Parameter
 from tests.unit.importer.test_importer_oddities import (
     CONTROL,

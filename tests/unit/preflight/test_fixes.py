@@ -9,7 +9,7 @@ import pytest
 
 from backend.foundation.preflight.findings import Code, Fix, findings
 from backend.foundation.preflight.fixes import RESTORE_LIST, Fixes
-from drivers.computer.host_settings import HostSettings, Setting, command
+from drivers.computer.timing.host_settings import HostSettings, Setting, command
 from drivers.errors import NotAllowed
 from tests.support.computer import FakeComputer
 from tests.unit.preflight.test_findings import balanced, deep_idle

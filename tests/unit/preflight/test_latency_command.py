@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from backend import cli
 from backend.commands.server import latency
 from backend.foundation.preflight.adapters import Adapters
-from drivers.computer.latency_timer import LatencyTimers
+from drivers.computer.serial_ports.latency_timer import LatencyTimers
 from drivers.texts.message import speaking
 
 DEVICE = "/dev/ttyUSB7"

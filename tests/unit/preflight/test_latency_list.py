@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from backend.foundation.preflight.adapters import FILE, Adapters, most_reads
-from drivers.computer.latency_timer import InForce, LatencyTimers
+from drivers.computer.serial_ports.latency_timer import InForce, LatencyTimers
 from drivers.errors import Busy, NotAllowed, OutOfRange
 from tests.support.registry import ENUM, PARAMETERS
 

@@ -7,7 +7,13 @@ import pytest
 from backend.foundation.preflight.findings import Code, Effect, Finding
 from backend.foundation.preflight.texts import verdict_words
 from backend.foundation.preflight.verdicts import Grade, Purpose, verdicts
-from drivers.computer.lateness import EDGES_US, Histogram, Measured, broadcast_read, missed_bound
+from drivers.computer.timing.lateness import (
+    EDGES_US,
+    Histogram,
+    Measured,
+    broadcast_read,
+    missed_bound,
+)
 
 
 def run(period_us: int, cycles: int, missed: int) -> dict[int, Measured]:

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from backend.api.library.routes import delete_library_entry
+from backend.api.records.library.routes import delete_library_entry
 from backend.records.library.entries import Query
 from backend.records.recording.writer import RecordingWriter
 from backend.station.bench import Bench

@@ -93,7 +93,7 @@ class LockstepBus(can.BusABC):
             if not self.cut:
                 self._answers.put(frame)
 
-    # The loop's clock (drivers.canopen.synchronous.LoopClock)
+    # The loop's clock (drivers.canopen.exchange.synchronous.LoopClock)
 
     def now_s(self) -> float:
         return self.now_ns / 1e9

@@ -12,7 +12,7 @@ import pytest
 from backend.analysis.loop.loop_structure import Gains
 from backend.analysis.loop.margins import open_from_closed
 from backend.analysis.loop.notch import Notch
-from backend.analysis.response.sampling import Hold
+from backend.analysis.response.signal_path.sampling import Hold
 from backend.foundation.work.jobs import Progress
 from backend.tools.autotune.axis_facts import read_facts
 from backend.tools.autotune.gains import plan_gains

@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 
-from drivers.canopen.busload import bus_load
-from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.exchange.busload import bus_load
+from drivers.canopen.exchange.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange

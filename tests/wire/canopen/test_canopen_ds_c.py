@@ -17,7 +17,7 @@ from typing import Any
 import can
 import pytest
 
-from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.exchange.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, CyclicSignal, Link, LinkEvent, ScopeBlock

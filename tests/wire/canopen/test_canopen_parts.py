@@ -12,15 +12,15 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.canopen.adapter import open_bus, translate
-from drivers.canopen.cyclic import CanopenCyclic
-from drivers.canopen.drive_setup import DriveSetup
+from drivers.canopen.adapters.adapter import open_bus, translate
+from drivers.canopen.exchange.cyclic import CanopenCyclic
+from drivers.canopen.exchange.drive_setup import DriveSetup
+from drivers.canopen.exchange.images import Images
+from drivers.canopen.exchange.pdo import PdoPlan, plan, plan_within_load, set_up
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
-from drivers.canopen.images import Images
 from drivers.canopen.nodes import NodeWatch, emergency_text
-from drivers.canopen.pdo import PdoPlan, plan, plan_within_load, set_up
-from drivers.canopen.scanning import readable
-from drivers.canopen.sdo import fitted
+from drivers.canopen.sdo.scanning import readable
+from drivers.canopen.sdo.transfers import fitted
 from drivers.canopen.url import INTERFACES, parse_canopen_url
 from drivers.errors import LinkLost, NotAllowed, OutOfRange, Rejected
 from drivers.halt import HaltCause, Halted

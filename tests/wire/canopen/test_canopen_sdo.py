@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.canopen import sdo
-from drivers.canopen.channel import SdoChannel
+from drivers.canopen.sdo import transfers as sdo
+from drivers.canopen.sdo.channel import SdoChannel
 from drivers.errors import LinkTimeout, ProtocolError, Rejected
 from drivers.sdo_abort import abort_text, rejected
 from drivers.virtual.device import SdoAbort

@@ -12,7 +12,7 @@ import can
 import numpy as np
 import pytest
 
-from drivers.canopen.cyclic import CanopenCyclic
+from drivers.canopen.exchange.cyclic import CanopenCyclic
 from drivers.canopen.link import CanopenLink
 from drivers.cia402 import State
 from drivers.link import Address, CyclicSignal, Envelope, LinkEvent, ScopeBlock, Trajectory

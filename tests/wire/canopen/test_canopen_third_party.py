@@ -18,9 +18,9 @@ import can
 import canopen
 import pytest
 
+from drivers.canopen.adapters.slcan import AdapterLost, SlcanBus
 from drivers.canopen.frames import Frame, exact_bits, worst_case_bits
 from drivers.canopen.link import CanopenLink
-from drivers.canopen.slcan import AdapterLost, SlcanBus
 from drivers.link import Address
 from drivers.virtual.wires.can_wire import CanWire
 from drivers.virtual.wires.canopen import CanopenNode
@@ -134,7 +134,7 @@ async def test_our_link_works_over_slcan(slcan_bench: Bench) -> None:
 
 
 def test_python_cans_own_slcan_client_sees_a_refused_frame_as_nothing(tmp_path: Path) -> None:
-    """Why `drivers.canopen.slcan` exists: bus-off must not look like silence."""
+    """Why `drivers.canopen.adapters.slcan` exists: bus-off must not look like silence."""
     side = SlcanSide(tmp_path / "tty")
     node = CanopenNode(SmallDevice(), 5, time.monotonic_ns)
     with (

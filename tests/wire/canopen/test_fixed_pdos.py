@@ -11,9 +11,9 @@ from contextlib import asynccontextmanager
 import can
 import pytest
 
-from drivers.canopen.fixed_pdo import FixedPdo, fixed_pdos
+from drivers.canopen.exchange.fixed_pdo import FixedPdo, fixed_pdos
+from drivers.canopen.exchange.pdo import plan
 from drivers.canopen.link import CanopenLink
-from drivers.canopen.pdo import plan
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.link import Address, CyclicSignal, ScopeBlock

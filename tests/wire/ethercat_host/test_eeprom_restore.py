@@ -17,7 +17,7 @@ from drivers.ethercat.eeprom.plan import Plan, plan_identity, plan_restore
 from drivers.ethercat.eeprom.transfer import read_image, write_image
 from drivers.ethercat.wire.steps import Read
 from drivers.ethercat.wire.steps import Write as WriteStep
-from drivers.virtual.wires.ethercat.sii import Eeprom
+from drivers.virtual.wires.ethercat.controller.sii import Eeprom
 from profiles.bring_up import BringUp, SyncManagerRule
 from tests.wire.ethercat_host.by_hand import ByHand
 from tests.wire.ethercat_host.servo_device import servo_profile

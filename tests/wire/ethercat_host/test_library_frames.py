@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.computer.lateness import EDGES_US
+from drivers.computer.timing.lateness import EDGES_US
 from drivers.errors import DriveError, NotAllowed
 from drivers.ethercat.exchange import segmentcyclic
 from drivers.ethercat.link import EthercatLink

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from drivers import errors
-from drivers.computer import permissions, scheduling
+from drivers.computer import permissions
+from drivers.computer.timing import scheduling
 from drivers.errors import DriveError, LinkLost, Rejected
 from drivers.ethercat.exchange.cyclic import percentile_us
 from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
@@ -262,7 +263,7 @@ def test_short_turns_need_no_permission() -> None:
     """The kernel reports them by sched_getattr(2); in a process of its own, not for these tests."""
     code = """
 import ctypes, os, platform, struct
-from drivers.computer import scheduling
+from drivers.computer.timing import scheduling
 asked = scheduling.short_slice()
 reported = ctypes.create_string_buffer(56)
 number = {"x86_64": 315}.get(platform.machine(), 275)

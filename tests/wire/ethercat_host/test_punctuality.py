@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.computer.lateness import Histogram
+from drivers.computer.timing.lateness import Histogram
 from drivers.errors import NotAllowed
 from drivers.ethercat.process.punctuality import (
     Check,

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 
 from drivers.virtual.wires.ethercat.clock import LockstepClock, SteadyClock
-from drivers.virtual.wires.ethercat.dc import HOP_NS
+from drivers.virtual.wires.ethercat.controller.dc import HOP_NS
 
 from .frames import BWR, FRMW, LRW, SAFEOP, Wire
 

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from drivers.virtual.wires.ethercat import sii
+from drivers.virtual.wires.ethercat.controller import sii
 
 from .frames import Wire
 

@@ -17,11 +17,11 @@ from xml.etree.ElementTree import Element
 
 from drivers.virtual.device import ABORT_NOT_MAPPABLE, SdoAbort
 from drivers.virtual.mechanics.spec import MechanicsSpec
-from drivers.virtual.wires.ethercat import registers as reg
-from drivers.virtual.wires.ethercat import sii
 from drivers.virtual.wires.ethercat.clock import WireClock
-from drivers.virtual.wires.ethercat.dictionary import CoeDictionary
-from drivers.virtual.wires.ethercat.registers import AlState
+from drivers.virtual.wires.ethercat.controller import registers as reg
+from drivers.virtual.wires.ethercat.controller import sii
+from drivers.virtual.wires.ethercat.controller.registers import AlState
+from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary
 from drivers.virtual.wires.ethercat.slave import Slave, SlaveIdentity
 from profiles.schema import Parameter, PdoPart, PdoSet, PdoSpec, Profile
 from tests.wire.ethercat_host.servo_device import ServoDevice, servo_profile

@@ -9,10 +9,10 @@ import can
 import pytest
 import serial
 
-from drivers.canopen.adapter import translate
+from drivers.canopen.adapters.adapter import translate
 from drivers.canopen.url import parse_canopen_url
-from drivers.computer import terminals
-from drivers.computer.terminals import is_in_use, may_open, port_errno
+from drivers.computer.serial_ports import terminals
+from drivers.computer.serial_ports.terminals import is_in_use, may_open, port_errno
 from drivers.errors import LinkLost, OutOfRange
 from drivers.modbus import port as port_module
 from drivers.modbus.port import LineSettings, open_port

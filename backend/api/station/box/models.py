@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from backend.api.models import Message
+from backend.api.messages.models import Message
 
 PortName = Annotated[str, Field(max_length=15)]
 

@@ -6,11 +6,11 @@ import asyncio
 
 from fastapi import APIRouter, Request
 
-from backend.api.context import Me, TheBench
+from backend.api.requests.context import Me, TheBench
 from backend.api.station.box.models import BoxChange, BoxInfo, BoxPort
 from backend.station.install.box.kept import Box, keep, read
 from backend.station.install.box.roles import addresses_of, checked, port_of
-from drivers.computer.interfaces import network_interfaces
+from drivers.computer.network.interfaces import network_interfaces
 from drivers.texts.message import text
 
 router = APIRouter()

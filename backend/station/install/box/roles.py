@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 
 from backend.station.install.box.kept import Box, read
-from drivers.computer.interfaces import Interface
+from drivers.computer.network.interfaces import Interface
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text
 from drivers.urls import bus_kind, parse_url

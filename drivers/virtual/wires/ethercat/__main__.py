@@ -9,7 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from drivers.computer import scheduling
+from drivers.computer.timing import scheduling
 from drivers.errors import DriveError
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import number_device

@@ -13,10 +13,10 @@ from collections.abc import Callable
 from typing import IO, Any
 
 from drivers.virtual.device import SdoAbort, shaft_rev
-from drivers.virtual.wires.ethercat import registers as reg
-from drivers.virtual.wires.ethercat.coe import Oddities
-from drivers.virtual.wires.ethercat.foe import FileTrouble
-from drivers.virtual.wires.ethercat.registers import AlState
+from drivers.virtual.wires.ethercat.controller import registers as reg
+from drivers.virtual.wires.ethercat.controller.registers import AlState
+from drivers.virtual.wires.ethercat.mailbox.coe import Oddities
+from drivers.virtual.wires.ethercat.mailbox.foe import FileTrouble
 from drivers.virtual.wires.ethercat.segment import Segment, register
 from drivers.virtual.wires.ethercat.slave import Slave
 from drivers.virtual.wires.ethercat.trouble import Fate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from drivers.virtual.wires.ethercat import registers as reg
+from drivers.virtual.wires.ethercat.controller import registers as reg
 from drivers.virtual.wires.ethercat.slave import Slave
 
 LINK_UP_NS = 300_000_000

@@ -9,10 +9,10 @@ cycle (ETG.1020 clause 22, sync type 3).
 from __future__ import annotations
 
 from drivers.virtual.device import Device, ProcessImage, SdoAbort
-from drivers.virtual.wires.ethercat.dc import DistributedClock
-from drivers.virtual.wires.ethercat.dictionary import CoeDictionary, SyncReport
-from drivers.virtual.wires.ethercat.registers import AlCode
-from drivers.virtual.wires.ethercat.syncmanager import SyncManager
+from drivers.virtual.wires.ethercat.controller.dc import DistributedClock
+from drivers.virtual.wires.ethercat.controller.registers import AlCode
+from drivers.virtual.wires.ethercat.controller.syncmanager import SyncManager
+from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary, SyncReport
 
 _SHORTEST_CYCLE_NS = 31_250
 """Shortest cycle of our drives; a limit in the manual applies as well."""

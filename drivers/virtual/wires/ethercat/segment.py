@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from drivers.virtual.wires.ethercat.clock import WireClock
+from drivers.virtual.wires.ethercat.controller.registers import Command
 from drivers.virtual.wires.ethercat.line import Line
-from drivers.virtual.wires.ethercat.registers import Command
 from drivers.virtual.wires.ethercat.slave import Slave
 from drivers.virtual.wires.ethercat.trouble import NO_TROUBLE, Trouble
 

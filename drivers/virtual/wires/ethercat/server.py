@@ -11,7 +11,7 @@ import struct
 import time
 from typing import IO
 
-from drivers.computer.sockets import AF_PACKET, hold_name, receive_with_notes
+from drivers.computer.network.sockets import AF_PACKET, hold_name, receive_with_notes
 from drivers.errors import LinkLost
 from drivers.virtual.wires import netns
 from drivers.virtual.wires.ethercat.control import Control

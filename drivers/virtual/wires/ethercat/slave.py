@@ -10,18 +10,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.virtual.device import Device, SdoAbort, StartsWithNetwork
-from drivers.virtual.wires.ethercat import registers as reg
-from drivers.virtual.wires.ethercat import sii
-from drivers.virtual.wires.ethercat.al import AlStateMachine
 from drivers.virtual.wires.ethercat.clock import WireClock
-from drivers.virtual.wires.ethercat.coe import CoeServer
-from drivers.virtual.wires.ethercat.controller import Controller
-from drivers.virtual.wires.ethercat.dc import DistributedClock
-from drivers.virtual.wires.ethercat.dictionary import CoeDictionary, SyncReport
-from drivers.virtual.wires.ethercat.foe import FirmwareStore
-from drivers.virtual.wires.ethercat.mailbox import HEADER, Mailbox
+from drivers.virtual.wires.ethercat.controller import registers as reg
+from drivers.virtual.wires.ethercat.controller import sii
+from drivers.virtual.wires.ethercat.controller.al import AlStateMachine
+from drivers.virtual.wires.ethercat.controller.controller import Controller
+from drivers.virtual.wires.ethercat.controller.dc import DistributedClock
+from drivers.virtual.wires.ethercat.controller.registers import AlCode, AlState
+from drivers.virtual.wires.ethercat.mailbox.coe import CoeServer
+from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary, SyncReport
+from drivers.virtual.wires.ethercat.mailbox.foe import FirmwareStore
+from drivers.virtual.wires.ethercat.mailbox.mailbox import HEADER, Mailbox
 from drivers.virtual.wires.ethercat.process import ProcessData
-from drivers.virtual.wires.ethercat.registers import AlCode, AlState
 
 _HOUSEKEEPING_NS = 1_000_000
 _NEVER = 1 << 62

@@ -5,7 +5,7 @@ from urllib.parse import unquote
 import pytest
 from starlette.responses import Response
 
-from backend.api.disposition import disposition
+from backend.api.messages.disposition import disposition
 
 
 @pytest.mark.parametrize("name", ["report-龙门轴.html", 'a "b".npz', "X.pdf", "é;ü\r\nZ: 1.pdf"])

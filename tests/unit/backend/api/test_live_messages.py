@@ -10,7 +10,7 @@ import pytest
 
 from backend.api.app import make_app
 from backend.api.live import messages, people_messages
-from backend.api.models import Message
+from backend.api.messages.models import Message
 from backend.station.bench import Bench
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from backend.api.errors import NotFound, problem_of
-from backend.api.named_profile import profile_named
+from backend.api.messages.errors import NotFound, problem_of
+from backend.api.requests.named_profile import profile_named
 
 
 def test_a_profile_that_does_not_exist_is_not_found() -> None:

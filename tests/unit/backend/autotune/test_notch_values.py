@@ -12,7 +12,7 @@ import pytest
 
 from backend.analysis.loop.notch import LevelCalibration, Notch
 from backend.analysis.loop.notch_effect import fit_effect, seen_ratio
-from backend.analysis.response.sampling import SignalPath
+from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.api.tuning.design import preview_notches
 from backend.api.tuning.models import NotchPreviewRequest
 from backend.axes.axis.axis import Axis

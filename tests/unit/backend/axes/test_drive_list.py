@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.api.errors import NotFound
+from backend.api.messages.errors import NotFound
 from backend.api.station.routes import remove_drive
 from backend.axes.axis.remembered import AxisRecord
 from backend.axes.scales.scale import ScaleUnknown

@@ -11,10 +11,10 @@ from typing import Any
 import httpx
 import pytest
 
-from backend.api import convert
 from backend.api.live.live import LiveHub
 from backend.api.live.page import Page
 from backend.api.live.watch import _LOOK_S, SILENCE_S, SILENT_END_S
+from backend.api.messages import convert
 from backend.api.security.socket import OpenSockets
 from backend.commands.base.remote import _not_done
 from backend.foundation.people.identity import LOCAL, Actor, acting

@@ -16,13 +16,13 @@ from typing import Any, get_args
 import httpx
 import pytest
 
-from backend.api import convert
-from backend.api.errors import TITLES, problem_of
 from backend.api.live.connection import Connection
 from backend.api.live.jog import Jogs
 from backend.api.live.messages import JogEnded, JogStart, JogStop, StopAll, StopTaken, from_page
 from backend.api.live.people_messages import EnableRelease
 from backend.api.live.people_views import PeopleViews
+from backend.api.messages import convert
+from backend.api.messages.errors import TITLES, problem_of
 from backend.commands.drive import live as command
 from backend.foundation.people.identity import LOCAL
 from backend.foundation.people.rights import Right

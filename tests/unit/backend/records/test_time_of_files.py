@@ -19,7 +19,7 @@ from backend.axes.parameters.set_file import BadSet, parse
 from backend.axes.parameters.toml_keys import deepest_key
 from backend.records.handover.read import read_list
 from profiles import load_profile
-from profiles.importer.eds_sections import Section
+from profiles.importer.eds.sections import Section
 
 SIZE = 60_000
 #: Processor time; a reader that takes the square of the size needs at least 2 s.

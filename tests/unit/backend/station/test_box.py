@@ -11,7 +11,7 @@ import pytest
 from backend.station.install.box.kept import Box, keep, names_of, read
 from backend.station.install.box.roles import checked, require_not_office
 from backend.station.install.box.shown import phone_address, scan_code
-from drivers.computer.interfaces import Interface
+from drivers.computer.network.interfaces import Interface
 from drivers.errors import DriveError, NotAllowed
 
 PORTS = [

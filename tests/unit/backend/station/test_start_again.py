@@ -14,7 +14,7 @@ from backend.api.station.models import Health
 from backend.commands.server import serve as serving_module
 from backend.commands.server.serve import Serving, serve
 from backend.station.bench import Bench
-from drivers.computer import sockets
+from drivers.computer.network import sockets
 from drivers.errors import Busy
 
 HEALTH = Health(version="0.2.0", time=datetime.now(UTC), demo=False, tour=False).model_dump_json()

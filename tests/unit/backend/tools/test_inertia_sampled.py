@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.analysis.mechanics.identification_path import MoveLimits, design_moves
-from backend.analysis.mechanics.inertia import InertiaResult
+from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
+from backend.analysis.mechanics.slow_moves.inertia import InertiaResult
 from backend.axes.axis.axis import Envelope
 from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.inertia.evaluation import InertiaSettings, _loop_gain, evaluate

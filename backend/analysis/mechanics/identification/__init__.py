@@ -1,0 +1,1 @@
+"""Model of mechanics fitted to measured responses: trials, fit, modes and uncertainty."""

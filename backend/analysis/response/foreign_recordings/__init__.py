@@ -1,0 +1,1 @@
+"""Responses from recordings of other programs: excitation, estimate, modes and band."""

@@ -1,0 +1,1 @@
+"""Path from sent setpoint to recorded signal: sampling, hold, delay, current loop."""

@@ -1,0 +1,1 @@
+"""The server's types as messages: models, conversion, errors, and their OpenAPI document."""

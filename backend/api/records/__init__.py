@@ -1,0 +1,1 @@
+"""Routes of what is kept and passed on: sets, library, handover, audit."""

@@ -1,0 +1,1 @@
+"""CAN adapters: opening one, sending, receiving, and reopening it after a loss."""

@@ -1,0 +1,1 @@
+"""Network interfaces: sockets, frames, offloads and namespaces."""

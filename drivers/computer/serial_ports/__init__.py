@@ -1,0 +1,1 @@
+"""Serial ports: terminals, and the latency timer of USB adapters."""

@@ -1,0 +1,1 @@
+"""Punctuality: clocks, real-time scheduling, measured delays, settings that cost time."""

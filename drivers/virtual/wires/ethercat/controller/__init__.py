@@ -1,0 +1,1 @@
+"""The slave controller: registers, process memory, states, clocks and EEPROM."""

@@ -1,0 +1,1 @@
+"""The mailbox of a slave and its protocols: CoE with its dictionary, FoE."""

@@ -1,0 +1,1 @@
+"""Export of a profile as a description file for other programs."""
