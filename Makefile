@@ -21,7 +21,7 @@ run: install ## the demo bench of virtual drives in a browser page
 test: ready ## everything that CI checks; at most 15 minutes on two processors
 	$(BIN)/python tests/run_all.py
 
-test-long: ready ## the tests that `make test` leaves out for their length; some 40 minutes
+test-long: ready ## every check with every test, those of `make test` among them; an hour
 	$(BIN)/python tests/run_all.py --long
 
 # What the tests need; Python packages and page at a time, each of which waits for a registry.

@@ -2,8 +2,8 @@
 
     python tests/run_all.py [--fast | --long]
 
-``--fast`` leaves out the suites (what pre-commit runs). ``--long`` runs the tests that are marked
-``long`` and nothing else (see `tests/support/long_suite.py`).
+``--fast`` leaves out the suites (what pre-commit runs). ``--long`` runs the tests with the marker
+``long`` as well (see `tests/support/long_suite.py`).
 """
 
 from __future__ import annotations
@@ -210,17 +210,12 @@ def main() -> int:
     shutil.rmtree(ROOT / ".pytest_cache", ignore_errors=True)
     began = time.monotonic()
     runner = Runner(sys.stdout)
-    checks: list[Check] = []
-    if "--long" in sys.argv:
-        checks = suites("only")
-        runner.run(checks)
-    else:
-        checks = [*QUICK, *QUICK_BESIDE]
-        run_quick(runner)
-        if "--fast" not in sys.argv:
-            suite_checks = [*suites("without"), *MATRIX]
-            checks += suite_checks
-            runner.run(suite_checks)
+    checks = [*QUICK, *QUICK_BESIDE]
+    run_quick(runner)
+    if "--fast" not in sys.argv:
+        rest = [*suites("all" if "--long" in sys.argv else "without"), *MATRIX]
+        runner.run(rest)
+        checks += rest
     failed = runner.failed
     print(f"failed: {', '.join(failed)}" if failed else "all checks passed")
     print(

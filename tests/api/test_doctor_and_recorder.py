@@ -172,6 +172,7 @@ def test_a_node_that_waits_to_be_started_and_one_that_has_a_fault(station: Stati
     assert [cause["code"] for cause in only["causes"]] == ["can_not_started"], only
 
 
+@pytest.mark.long
 def test_a_mute_node_is_named(station: Station) -> None:
     station.drives.command(do="mute", wire=CAN, on=True)
     try:

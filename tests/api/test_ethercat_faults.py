@@ -367,6 +367,7 @@ def test_a_busy_eeprom_ends_in_words_and_is_written_later(running: Segment) -> N
     running.jogs()
 
 
+@pytest.mark.long
 def test_damaged_frames_name_their_cable_until_cleared(running: Segment) -> None:
     running.trouble("corrupt", slave=B, port=0, count=3)
     sentence = within(10, lambda: running.view()["stations"][B]["ports"][0]["findings"])[-1]

@@ -109,6 +109,7 @@ def test_figures_of_the_exchange(in_real_time: Station) -> None:
         station.http.delete("/buses/cyclic", params={"url": URL})
 
 
+@pytest.mark.long
 def test_alias_wants_to_be_confirmed_and_is_read_back_after_power_on(station: Station) -> None:
     body = {"url": URL, "station": 2, "alias": 1234}
     asked = station.http.post("/ethercat/alias", json=body)
@@ -128,6 +129,7 @@ def eeprom(station: Station, way: str, data: bytes = b"", **query: Any) -> Any:
     )
 
 
+@pytest.mark.long
 def test_an_eeprom_is_saved_compared_and_restored_after_two_confirmations(
     station: Station,
 ) -> None:

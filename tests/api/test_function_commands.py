@@ -33,6 +33,7 @@ def call(*arguments: str, code: int = 0) -> str:
     return result.output
 
 
+@pytest.mark.long
 def test_terminals(url: str) -> None:
     found = json.loads(call("io", url, "--profile", "mms7", "--json"))
     assert [terminal["name"] for terminal in found] == ["DI1", "DI2", "DI3", "DI4", "DO1", "DO2"]

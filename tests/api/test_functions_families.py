@@ -143,6 +143,7 @@ def test_m6l_forces_outputs_only_while_process_data_run(station: Station) -> Non
     put(station, "m6l", "2003:10", before)
 
 
+@pytest.mark.long
 def test_m6l_switches_a_virtual_input_on(station: Station) -> None:
     """P03.14 switches DI1 to DI9 on next to their pins (000:3276)."""
     path = "/drives/m6l/io/forcing/simulation"
@@ -156,7 +157,7 @@ def test_m6l_switches_a_virtual_input_on(station: Station) -> None:
     assert terminals(station, "m6l")["DI9"]["on"] is False
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     ("family", "expected"),
     [

@@ -176,6 +176,7 @@ def test_export_compare_and_changes(station: Station, x: str, held: str) -> None
     station.ok(station.http.put(f"/drives/{x}/parameters/{GAIN}", json={"raw": before}))
 
 
+@pytest.mark.long
 def test_a_segment_is_one_list_and_noted_for_every_drive(
     station: Station, x: str, held: str
 ) -> None:
@@ -233,6 +234,7 @@ def test_reasons_are_in_the_language_that_is_asked_for(station: Station, x: str,
     assert not english & reasons
 
 
+@pytest.mark.long
 def test_the_script_writes_over_the_api(
     station: Station, x: str, held: str, tmp_path: Path
 ) -> None:
@@ -256,7 +258,7 @@ def test_the_script_writes_over_the_api(
     assert stranger.returncode == 1
 
 
-@pytest.mark.long(keep=5)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize(
     ("body", "status", "words"),
     [
@@ -313,6 +315,7 @@ def test_hostile_lists_get_one_clear_error(station: Station, x: str, content: by
     assert answer.json()["remedy"]
 
 
+@pytest.mark.long
 def test_a_huge_list_is_refused(station: Station, x: str) -> None:
     path = f"/drives/{x}/handover/compare"
     large = station.http.post(path, params={"file": "l.xml"}, content=b" " * (MAX_BYTES + 1))

@@ -219,6 +219,7 @@ async def test_library_lists_tags_and_versions(http: httpx.AsyncClient) -> None:
     assert back.json()["deleted"] is None
 
 
+@pytest.mark.long
 async def test_notes_that_another_person_changed_are_not_overwritten(
     http: httpx.AsyncClient,
 ) -> None:
@@ -326,6 +327,7 @@ async def audit_status(http: httpx.AsyncClient, *, troubled: bool) -> Any:
             await asyncio.sleep(0.02)
 
 
+@pytest.mark.long
 async def test_a_database_that_cannot_be_used_is_reported_and_motion_goes_on(
     tmp_path: Path, http: httpx.AsyncClient, bench: Bench
 ) -> None:

@@ -71,6 +71,7 @@ def test_jog_moves_at_speed_and_stops_on_release(station: Station, x: str, page:
     assert now["state"] == "Switch on disabled", "the power state is as it was"
 
 
+@pytest.mark.long
 def test_jog_stops_when_the_renewals_stop(station: Station, x: str, page: Live) -> None:
     with jogged(station, page, x, fast):
         pass
@@ -90,6 +91,7 @@ def test_jog_stops_when_the_page_is_gone(station: Station, x: str) -> None:
     assert lease["holder"] is None
 
 
+@pytest.mark.long
 def test_stop_works_for_everyone_and_nothing_enables_again(
     station: Station, x: str, page: Live
 ) -> None:
@@ -103,6 +105,7 @@ def test_stop_works_for_everyone_and_nothing_enables_again(
     assert now["state"] != "Operation enabled"
 
 
+@pytest.mark.long
 def test_jog_keeps_the_travel_limit(station: Station, x: str, page: Live) -> None:
     with jogged(station, page, x, stands_after_half_a_turn, travel_limit=0.5) as start:
         time.sleep(0.3)  # and there it stays
@@ -224,6 +227,7 @@ def test_velocity_needs_consent_where_the_drive_has_no_watchdog(station: Station
     assert at_rest(station, x)
 
 
+@pytest.mark.long
 def test_homing_to_the_present_position(station: Station, x: str) -> None:
     methods = station.ok(station.http.get(f"/drives/{x}/homing-methods"))
     assert {33, 34} <= {method["method"] for method in methods}
@@ -235,6 +239,7 @@ def test_homing_to_the_present_position(station: Station, x: str) -> None:
     assert answer.status_code == 409
 
 
+@pytest.mark.long
 def test_back_and_forth(station: Station, x: str) -> None:
     start = position(station, x)
     body = {"first": start, "second": start + 0.5, "speed": 600, "acceleration": 10000,
@@ -317,6 +322,7 @@ def test_power_cut_while_jogging(station: Station, x: str, page: Live) -> None:
     assert ended["problem"] is None, ended
 
 
+@pytest.mark.long
 def test_setpoints_of_an_enabled_axis_are_not_written_by_hand(station: Station, x: str) -> None:
     station.ok(
         station.http.post(f"/drives/{x}/transition", json={"goal": "Operation enabled", "mode": 3})

@@ -109,6 +109,7 @@ def _jog(station: Station, drive: str) -> None:
     assert float(station.state(drive)["position"]) - before > 0.5
 
 
+@pytest.mark.long
 def test_findings_are_in_the_language_of_whoever_asks(station: Station) -> None:
     answer = station.http.post(
         "/descriptions", params={"file": "nova.eds", "profile": "spoken"}, content=makers_eds()
@@ -129,6 +130,7 @@ def test_findings_are_in_the_language_of_whoever_asks(station: Station) -> None:
     assert "忽略" in chinese["summary"]
 
 
+@pytest.mark.long
 def test_an_edited_profile_is_used_without_a_restart(station: Station) -> None:
     made = imported(station, makers_eds(), "nova.eds", profile="edited")
     path = Path(made["path"])
@@ -140,6 +142,7 @@ def test_an_edited_profile_is_used_without_a_restart(station: Station) -> None:
     assert not profiles["mms7"]["own"]
 
 
+@pytest.mark.long
 def test_a_person_classifies_an_object_of_an_imported_profile(station: Station) -> None:
     extra = b"[2F01]\r\nParameterName=Gain\r\nDataType=0x0006\r\nAccessType=rw\r\n"
     imported(station, makers_eds() + extra, "nova.eds", profile="classified")
@@ -204,6 +207,7 @@ def test_a_broken_own_profile_spoils_only_itself(station: Station) -> None:
         path.unlink()
 
 
+@pytest.mark.long
 def test_what_is_no_description_is_refused_in_words(station: Station) -> None:
     job = station.job(
         station.http.post("/descriptions", params={"file": "a.xml"}, content=b"<EtherCATInfo>")

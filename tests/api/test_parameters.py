@@ -189,6 +189,7 @@ def test_exchanged_drive_is_noticed_before_anything_is_written(station: Station)
         station.ok(station.http.delete(f"/drives/{x}"))
 
 
+@pytest.mark.long
 def test_a_set_goes_to_other_tools_and_comes_back(station: Station, x: str) -> None:
     saved = station.ok(station.http.post(f"/drives/{x}/sets", json={"file": "for export"}))
     for kind in ("csv", "dcf"):

@@ -59,6 +59,7 @@ def test_an_interface_that_is_not_there_blocks_and_is_named_first(tmp_path: Path
     assert "not suitable" in done.stdout
 
 
+@pytest.mark.long
 def test_a_bus_in_use_is_left_alone(tmp_path: Path) -> None:
     with hold_name("servodeck-ethercat-lo"):
         done = command("lo", "--seconds", "1", "--config", str(tmp_path))
@@ -80,6 +81,7 @@ def test_a_measurement_is_a_job_and_its_result_is_kept(station: Station) -> None
     assert "1 kHz 示波器" in {one["name"] for one in after["verdicts"]}
 
 
+@pytest.mark.long
 def test_a_name_that_is_no_interface_is_refused(station: Station) -> None:
     answer = station.http.get("/preflight", params={"interface": "../etc"})
     assert answer.status_code == 422

@@ -118,7 +118,7 @@ def test_an_interface_or_a_capability_that_is_missing(
     assert first(computer.found(interface, without), before) == code
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cause", "undo", "code"),
     [

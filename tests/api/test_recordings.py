@@ -141,6 +141,7 @@ def test_trigger_keeps_what_was_before_it(station: Station, x: str) -> None:
     assert abs(table[0, 2]) < 0.05 * RPM_100, "it stood before"
 
 
+@pytest.mark.long
 def test_full_disk_ends_it_and_the_axis_goes_on(station: Station, x: str) -> None:
     body = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
             "travel_limit": 100, "torque_limit": 150, "timeout_s": 20, "consent": True}  # fmt: skip

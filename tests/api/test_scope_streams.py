@@ -124,6 +124,7 @@ def test_a_subscription_follows_the_exchange_as_it_starts_and_ends(
         assert heads(page.binary)[-1][4] > first[4], "one clock throughout"
 
 
+@pytest.mark.long
 def test_what_the_cycle_does_not_carry_is_a_stream_of_its_own(station: Station, axis: str) -> None:
     exchange(station, run=True)
     with station.live() as page:

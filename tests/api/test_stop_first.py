@@ -100,6 +100,7 @@ def wait_for_samples(page: Live) -> None:
     until(lambda: page.receive() and page.binary, HANG_S)
 
 
+@pytest.mark.long
 def test_the_answers_of_a_stop_carry_the_number_of_its_press(station: Station) -> None:
     with station.live() as page:
         for press in (7, 8):

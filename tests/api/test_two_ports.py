@@ -182,6 +182,7 @@ def test_a_restarted_node_is_reported_and_read_anew(station: Station, z: str) ->
     assert not station.ok(station.http.get(f"/drives/{z}"))["unsaved"]
 
 
+@pytest.mark.long
 def test_a_mute_node_is_named_with_a_remedy(station: Station, z: str) -> None:
     station.drives.command(do="mute", wire=CAN, on=True)
     try:

@@ -8,12 +8,13 @@ from playwright.sync_api import Page, expect
 from tests.browser.busy_page import block, hold, lasts, resumes_after_release
 from tests.browser.driving import SILENT, Bench, open_axis
 
+pytestmark = pytest.mark.long
+
 #: Longer than the 200 ms after which the axis brakes, with room to the 500 ms after which a hold
 #: has ended for good, as the computer of the tests is busy with others, too.
 BLOCK_MS = 260
 
 
-@pytest.mark.long
 def test_a_hold_lasts_through_a_busy_moment_and_the_page_says_so(
     laptop: Page, bench: Bench
 ) -> None:
@@ -29,14 +30,12 @@ def test_a_hold_lasts_through_a_busy_moment_and_the_page_says_so(
     expect(page.get_by_text("The signal was interrupted for")).to_be_visible()
 
 
-@pytest.mark.long
 def test_a_release_in_a_busy_moment_is_final(laptop: Page, bench: Bench) -> None:
     open_axis(laptop, bench.drive, "motion")
     for _ in range(3):
         assert not resumes_after_release(laptop, bench, BLOCK_MS)
 
 
-@pytest.mark.long
 def test_a_page_that_is_busy_for_too_long_ends_the_hold(laptop: Page, bench: Bench) -> None:
     open_axis(laptop, bench.drive, "motion")
     hold(laptop, bench)

@@ -12,6 +12,8 @@ from drivers.cia402 import State
 from tests.browser.conftest import LAPTOP, _open
 from tests.support.station import Station, until
 
+pytestmark = pytest.mark.long
+
 AXIS_PAGES = (
     "overview", "parameters", "motion", "tune", "response", "gains", "setup", "io", "alarms",
 )  # fmt: skip
@@ -58,7 +60,6 @@ def chinese(browser: Browser, station: Station) -> Iterator[Page]:
         yield page
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("place", ["scene", "axis/x/overview"])
 def test_states_of_the_scene_are_chinese_with_the_english_in_brackets(
     station: Station, x: str, chinese: Page, place: str
@@ -76,7 +77,6 @@ def test_states_of_the_scene_are_chinese_with_the_english_in_brackets(
     assert below["y"] >= frame["y"] + frame["height"] - 1
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", [*AXIS_PAGES, *BENCH_PAGES])
 def test_no_phrase_stays_english(station: Station, x: str, chinese: Page, name: str) -> None:
     place = f"axis/{x}/{name}" if name in AXIS_PAGES else name

@@ -12,7 +12,7 @@ from tests.browser import tuning
 from tests.browser.conftest import LAPTOP, _open
 from tests.support.station import HANG_S, Station, until
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.timeout(300), pytest.mark.long]
 
 #: The machine's cycle: three revolutions out and back.
 SEQUENCE = {
@@ -44,7 +44,6 @@ def machine(station: Station, axis: str) -> Iterator[Any]:
     until(lambda: station.state(axis)["moving_job"] is None, HANG_S, "the axis is free")
 
 
-@pytest.mark.long
 def test_a_cycle_is_read_and_shown(page: Page, station: Station, axis: str, machine: Any) -> None:
     panel = tuning.open_panel(page, axis, "Load of the machine's cycle")
     # The tool moves nothing.
@@ -65,7 +64,6 @@ def test_a_cycle_is_read_and_shown(page: Page, station: Station, axis: str, mach
     assert jobs[machine["id"]] == "running"
 
 
-@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "机器循环负载")

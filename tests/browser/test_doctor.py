@@ -14,6 +14,8 @@ from drivers.doctor.diagnosis import catalogue
 from drivers.virtual.wires.netns import unavailable
 from tests.support.station import Station, until
 
+pytestmark = pytest.mark.long
+
 SEGMENT, CAN = "ethercat://virtual0", "canopen://virtual0"
 BENCH = f"""
 [[axis]]
@@ -99,7 +101,6 @@ CASES: list[tuple[str, str, Callable[[Station], Callable[[], None]]]] = [
 ]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("url", "cause", "inject"), CASES, ids=[case[1] for case in CASES])
 def test_the_first_cause_is_the_injected_one(
     laptop: Page,
@@ -123,7 +124,6 @@ def test_the_first_cause_is_the_injected_one(
         undo()
 
 
-@pytest.mark.long
 def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> None:
     """The drive refuses Safe-Op for its clock first, and takes the setting after a repair."""
     drop = refusing(0x0030)(station)
@@ -147,7 +147,6 @@ def test_a_setting_is_tried_kept_and_undone(laptop: Page, station: Station) -> N
     expect(card).not_to_contain_text(kept, timeout=SLOW_MS)
 
 
-@pytest.mark.long
 def test_settings_to_try_on_a_phone_in_chinese(phone: Page, station: Station) -> None:
     phone.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     phone.reload()

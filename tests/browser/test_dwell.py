@@ -14,7 +14,7 @@ from drivers.virtual.mechanics import analytic_response
 from tests.browser import tuning
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 MOTOR, LOAD, STIFFNESS, RATED_NM = 5e-5, 3e-5, 30.0, 1.27
 DWELL_HZ, DWELL_PERCENT = 60.0, 8.0
@@ -55,7 +55,6 @@ def axis(station: Station) -> str:
     return axis
 
 
-@pytest.mark.long
 def test_a_dwell_shows_what_it_excites(page: Page, station: Station, axis: str) -> None:
     panel = tuning.open_panel(page, axis, "Dwell at one frequency")
     expect(panel.get_by_text("WARNING: the axis is enabled and moves")).to_be_visible()
@@ -83,7 +82,6 @@ def test_the_report_has_the_dwell_in_both_languages(station: Station, axis: str)
         assert words in tuning.report_of(station, axis, language)
 
 
-@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "定频激振")

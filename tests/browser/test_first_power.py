@@ -16,7 +16,7 @@ from tests.browser.conftest import LAPTOP, PATIENCE_MS, _open
 from tests.browser.driving import open_axis
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.timeout(400), pytest.mark.long]
 
 BENCH = (
     tuning.BENCH
@@ -55,7 +55,6 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     next(opened, None)
 
 
-@pytest.mark.long
 def test_exchanged_phases_are_found_and_named(page: Page, station: Station) -> None:
     axis = station.add(1, tuning.URL, name="Spindle")
     tuning.keep_exchanging(page, axis)

@@ -16,6 +16,8 @@ from tests.browser.conftest import HERE, LAPTOP, PATIENCE_MS
 from tests.support.guarded import CHEAP, PASSWORD
 from tests.support.station import Station
 
+pytestmark = pytest.mark.long
+
 PORTS = [
     Interface("eth0", up=True, is_wired=True, is_can=False),
     Interface("eth1", up=True, is_wired=True, is_can=False),
@@ -50,7 +52,6 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     assert defects == []
 
 
-@pytest.mark.long
 def test_from_the_code_to_the_roles(page: Page, people: People, station: Station) -> None:
     page.get_by_label("Code").fill(people.accounts.setup_code)
     page.get_by_label("Name").fill("Anna")

@@ -15,7 +15,7 @@ from tests.api.test_gantry import AXIS, BEAM, LEAD_MM, SQUARE_RAD, STIFFNESS, co
 from tests.browser import tuning
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 #: The beam is square but for the defect that is planted.
 BENCH = (
@@ -44,7 +44,6 @@ def axis(station: Station) -> str:
     return left
 
 
-@pytest.mark.long
 def test_what_is_out_of_square_is_named_with_the_next_step(
     page: Page, station: Station, axis: str
 ) -> None:

@@ -14,6 +14,8 @@ from playwright.sync_api import Locator, Page, expect
 from tests.browser.driving import Bench
 from tests.support.station import Station
 
+pytestmark = pytest.mark.long
+
 GAIN = "2005:03"
 FILE = "handed.sdset"
 
@@ -39,7 +41,6 @@ def fits(page: Page) -> bool:
     return bool(page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_export_compare_and_what_changed(
     width: str, request: pytest.FixtureRequest, bench: Bench, held: int, tmp_path: Path
@@ -117,7 +118,6 @@ def planted(station: Station, drive: str) -> tuple[bytes, dict[str, int]]:
     return tostring(root), changed
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_thirty_planted_conflicts_are_shown_and_no_other(
     width: str,
@@ -147,7 +147,6 @@ def test_thirty_planted_conflicts_are_shown_and_no_other(
     assert fits(page)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("width", ["laptop", "phone"])
 def test_a_whole_segment_in_one_list(
     width: str, request: pytest.FixtureRequest, station: Station, held: int, tmp_path: Path
@@ -187,7 +186,6 @@ def test_a_whole_segment_in_one_list(
         station.remove(y)
 
 
-@pytest.mark.long
 def test_in_chinese(laptop: Page, held: int) -> None:
     laptop.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     try:

@@ -11,11 +11,12 @@ from tests.api.test_response_import import QUERY, REAL
 from tests.browser.driving import Bench, open_axis
 from tests.browser.test_frame import SIDEWAYS
 
+pytestmark = pytest.mark.long
+
 #: 50 000 rows are evaluated twice: when they are stored and when they are shown.
 EVALUATED_MS = 120_000
 
 
-@pytest.mark.long
 def test_a_recording_becomes_a_response(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "response")
@@ -43,7 +44,6 @@ def test_a_recording_becomes_a_response(laptop: Page, bench: Bench) -> None:
     assert page.evaluate(SIDEWAYS) == 0
 
 
-@pytest.mark.long
 def test_what_is_no_recording_is_refused_in_words(phone: Page, bench: Bench) -> None:
     page = phone
     open_axis(page, bench.drive, "response")

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser import tuning
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 MOTOR, LOAD, STIFFNESS, GAP_RAD = 5e-5, 1.5e-4, 60.0, 0.004
 BENCH = f"""
@@ -64,7 +64,6 @@ def axis(station: Station) -> str:
     return axis
 
 
-@pytest.mark.long
 def test_the_backlash_is_measured_and_shown(page: Page, station: Station, axis: str) -> None:
     panel = tuning.open_panel(page, axis, "Load side")
     expect(panel.get_by_text("WARNING: the axis is enabled and moves")).to_be_visible()
@@ -86,7 +85,6 @@ def test_the_report_has_the_load_side_in_both_languages(station: Station, axis: 
         assert words in tuning.report_of(station, axis, language)
 
 
-@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "负载侧")

@@ -10,12 +10,13 @@ from playwright.sync_api import Page, expect
 from tests.browser.driving import Bench, find, open_axis
 from tests.support.station import until
 
+pytestmark = pytest.mark.long
+
 #: Retry enable, 0 from the factory: after a fault the drive goes on by itself. No page is made
 #: for it.
 SETTING = "200B:07"
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("key", ["6040:00", "6060:00", "60FF:00"])
 def test_what_moves_is_not_written_in_the_table(laptop: Page, bench: Bench, key: str) -> None:
     page = laptop
@@ -39,7 +40,6 @@ def test_what_moves_is_not_written_in_the_table(laptop: Page, bench: Bench, key:
     expect(page.get_by_role("heading", level=1)).to_contain_text("Motion")
 
 
-@pytest.mark.long
 def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: Bench) -> None:
     page = laptop
     assert bench.raw(SETTING) == 0
@@ -69,7 +69,6 @@ def test_a_setting_that_can_move_needs_reason_and_consent(laptop: Page, bench: B
     assert any("test of the supply" in entry["text"] for entry in log)
 
 
-@pytest.mark.long
 def test_with_power_it_is_not_written(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw(SETTING)

@@ -13,6 +13,8 @@ from profiles import load_profile
 from profiles.importer import export_eds
 from tests.support.station import Station
 
+pytestmark = pytest.mark.long
+
 BENCH = """
 [[axis]]
 name = "Unknown"
@@ -43,7 +45,6 @@ def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
         running.stop()
 
 
-@pytest.mark.long
 def test_import_from_the_connect_page(laptop: Page, station: Station, tmp_path: Path) -> None:
     text = export_eds(load_profile("generic402"), datetime(2020, 1, 2), "nova.eds")
     text = text.replace("VendorName=any", "VendorName=Nova").replace("=CiA 402 drive", "=N-400")
@@ -71,7 +72,6 @@ def test_import_from_the_connect_page(laptop: Page, station: Station, tmp_path: 
     station.ok(station.http.delete(f"/drives/{drive['id']}"))
 
 
-@pytest.mark.long
 def test_the_missing_port_is_connected(laptop: Page, station: Station) -> None:
     drive = station.add(3, "canopen://virtual0", "ds_c", "Z")
     page = laptop

@@ -26,6 +26,8 @@ from tests.browser.conftest import FLAGS, PATIENCE_MS
 from tests.browser.driving import Bench
 from tests.support.station import HANG_S, until
 
+pytestmark = pytest.mark.long
+
 #: Loading and compiling 43 MB of WebAssembly on a busy machine.
 VIEWER_MS = 90_000
 
@@ -103,7 +105,6 @@ def fetched(page: Page, kind: str, folder: Path) -> Path:
     return path
 
 
-@pytest.mark.long
 def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path) -> None:
     """Read back with each format's own library, and compared with the recording itself."""
     move = {"mode": "PV", "target": 200, "acceleration": 3000, "deceleration": 3000,
@@ -158,7 +159,6 @@ def test_every_export_has_every_sample(page: Page, bench: Bench, tmp_path: Path)
     expect(page.get_by_text("No recordings.")).to_be_visible()
 
 
-@pytest.mark.long
 def test_armed_kept_and_bounded_from_the_page(page: Page, bench: Bench) -> None:
     page.get_by_label("Begins").select_option("fault")
     page.get_by_label("Name").fill("waiting")
@@ -217,7 +217,6 @@ def test_bundles_are_made_armed_and_deleted(page: Page, bench: Bench) -> None:
     expect(page.get_by_text("No support bundles.")).to_be_visible()
 
 
-@pytest.mark.long
 def test_the_viewer_shows_what_is_live_and_what_was_recorded(page: Page, bench: Bench) -> None:
     """Live data reach it, Esc stops from there, and a stored recording opens. One page for all:
     its 43 MB are compiled once."""
@@ -246,7 +245,6 @@ def _names(frames: list[str | bytes]) -> set[str]:
     return {str(message.get("name", "")) for part in found for message in part}
 
 
-@pytest.mark.long
 def test_the_scene_follows_what_is_set_and_escape_stops_from_there(
     scene_page: Page, bench: Bench
 ) -> None:

@@ -22,6 +22,8 @@ from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
 from tests.browser.tuning import ANTIRESONANCE_HZ, RESONANCE_HZ, row
 from tests.support.station import Station
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
@@ -62,7 +64,6 @@ def show(page: Page, axis: str, what: str) -> None:
     page.get_by_role("img", name=re.compile("^Magnitude, phase")).wait_for()
 
 
-@pytest.mark.long
 def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
     page = laptop
     show(page, axis, "Mechanics")
@@ -84,7 +85,6 @@ def test_a_measurement_is_explained(laptop: Page, axis: str) -> None:
     expect(page.locator("dl.facts .pair", has_text="torque_percent")).to_contain_text("80")
 
 
-@pytest.mark.long
 def test_cursors_follow_mouse_and_keys(laptop: Page, axis: str) -> None:
     page = laptop
     show(page, axis, "Mechanics")
@@ -109,7 +109,6 @@ def test_cursors_follow_mouse_and_keys(laptop: Page, axis: str) -> None:
     assert tuning.number_in(row(table, "A").inner_text(), "Hz") == pytest.approx(here, rel=0.15)
 
 
-@pytest.mark.long
 def test_a_notch_is_dragged_and_predicted_but_not_written(
     laptop: Page, axis: str, station: Station
 ) -> None:
@@ -158,7 +157,6 @@ def test_a_notch_is_dragged_and_predicted_but_not_written(
     assert not any(slot["enabled"] for slot in slots)
 
 
-@pytest.mark.long
 def test_a_loop_is_shown_three_ways(laptop: Page, axis: str) -> None:
     page = laptop
     show(page, axis, "Speed loop")
@@ -175,7 +173,6 @@ def test_a_loop_is_shown_three_ways(laptop: Page, axis: str) -> None:
     expect(other.get_by_role("button", name="Compare")).to_be_disabled()
 
 
-@pytest.mark.long
 def test_every_export_can_be_read(laptop: Page, axis: str, tmp_path: Path) -> None:
     page = laptop
     show(page, axis, "Mechanics")
@@ -203,7 +200,6 @@ def test_every_export_can_be_read(laptop: Page, axis: str, tmp_path: Path) -> No
         assert {"meta.npy", "0.excitation.npy", "0.torque_nm.npy"} <= set(archive.namelist())
 
 
-@pytest.mark.long
 def test_a_damaged_file_is_refused_in_words(laptop: Page, axis: str, station: Station) -> None:
     page = laptop
     open_axis(page, axis, "response")
@@ -226,7 +222,6 @@ def test_a_damaged_file_is_refused_in_words(laptop: Page, axis: str, station: St
     expect(page.get_by_text("the same result as when it was measured")).to_be_visible()
 
 
-@pytest.mark.long
 def test_a_finger_that_scrolls_moves_no_marker(phone: Page, axis: str) -> None:
     page = phone
     show(page, axis, "Mechanics")

@@ -14,7 +14,7 @@ from tests.browser.conftest import LAPTOP, _open
 from tests.browser.driving import open_axis
 from tests.support.station import HANG_S, Station, until
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.timeout(400), pytest.mark.long]
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,6 @@ def page(browser: Browser, station: Station) -> Iterator[Page]:
     next(opened, None)
 
 
-@pytest.mark.long
 def test_a_function_is_recorded_and_signed(page: Page, station: Station) -> None:
     axis = station.add(1, tuning.URL, name="Spindle")
     tuning.keep_exchanging(page, axis)

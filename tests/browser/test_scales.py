@@ -13,6 +13,8 @@ from tests.api.test_scales_taught import BENCH, CAN, scales
 from tests.browser.driving import open_axis
 from tests.support.station import Station, until
 
+pytestmark = pytest.mark.long
+
 #: A busy computer takes its time for a move of 2 s.
 ENDED_MS = 60_000
 
@@ -34,7 +36,6 @@ def moved(card: Locator) -> int:
     return int(found[1]) if found else 0
 
 
-@pytest.mark.long
 def test_a_small_move_teaches_the_scales(laptop: Page, station: Station) -> None:
     page, drive = laptop, station.add(5, CAN, "generic402", "N")
     open_axis(page, drive, "overview")

@@ -21,6 +21,8 @@ from tests.browser.conftest import LAPTOP, PHONE, _open
 from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
 from tests.support.station import HANG_S, Station, until
 
+pytestmark = pytest.mark.long
+
 URL = "ethercat://virtual0"
 BENCH = f"""
 [[axis]]
@@ -142,7 +144,6 @@ def peaks(page: Page) -> list[tuple[float, float]]:
     return [(hertz, amplitude) for hertz, amplitude in found]
 
 
-@pytest.mark.long
 def test_a_step_is_caught_and_the_cursors_read_it(
     page: Page, station: Station, cyclic: str
 ) -> None:
@@ -185,7 +186,6 @@ def test_a_step_is_caught_and_the_cursors_read_it(
     soon(lambda: float(cursor_b.input_value()), pytest.approx(0.45, abs=0.01), "B is dragged")
 
 
-@pytest.mark.long
 def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cyclic: str) -> None:
     amplitude, hertz = 0.05, 7.0
     add_channel(page, "607A")
@@ -232,7 +232,6 @@ def test_a_sine_has_its_frequency_and_amplitude(page: Page, station: Station, cy
         expect(page.get_by_role("img", name=tab)).to_be_visible()
 
 
-@pytest.mark.long
 def test_timing_is_reported_and_follows_the_exchange(
     page: Page, station: Station, axis: str
 ) -> None:
@@ -246,7 +245,6 @@ def test_timing_is_reported_and_follows_the_exchange(
     assert page.get_by_text("no data for").count() == 0
 
 
-@pytest.mark.long
 def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, cable: Cable) -> None:
     expect(page.locator(f'[data-trace="{VELOCITY}"] .timing')).to_contain_text("synchronous")
     until(lambda: number(figure(page, VELOCITY, "rms")) >= 0, HANG_S)
@@ -260,7 +258,6 @@ def test_what_passes_without_a_connection_is_counted(page: Page, cyclic: str, ca
     expect(lost).to_contain_text("while there was no connection")
 
 
-@pytest.mark.long
 def test_setups_references_and_snapshots_are_kept(page: Page, station: Station, axis: str) -> None:
     add_channel(page, "60F4")
     page.get_by_label("Time shown").select_option("0.5")
@@ -440,7 +437,6 @@ def one_finger_moves_cursors(page: Page) -> None:
     page.get_by_role("button", name="Cursors").click()
 
 
-@pytest.mark.long
 def test_on_a_phone(browser: Browser, cable: Cable, axis: str) -> None:
     for page in _open(browser, cable.url, **PHONE):
         page.evaluate("location.hash = '#/scope'")

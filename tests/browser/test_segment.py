@@ -18,6 +18,8 @@ from tests.api.test_ethercat_faults import host_process
 from tests.browser.driving import Bench, open_axis
 from tests.support.station import Station, until
 
+pytestmark = pytest.mark.long
+
 URL = "ethercat://virtual0"
 AXIS = '[[axis]]\nname = "{name}"\ndrive = "mms7"\non = "{url}"\nstation = {at}\n'
 PLUS = "Hold to move in the positive direction"
@@ -90,7 +92,6 @@ def connect(page: Page) -> None:
     expect(page.get_by_role("heading", name="Cyclic exchange")).to_be_visible(timeout=SLOW_MS)
 
 
-@pytest.mark.long
 def test_exchange_jog_pulled_cable_and_return(laptop: Page, axis: Bench) -> None:
     page, segment = laptop, axis.station.drives.segments[URL]
     connect(page)
@@ -133,7 +134,6 @@ def test_a_slave_chosen_by_key_tells_about_itself(laptop: Page, axis: Bench) -> 
     expect(page.get_by_text("Alias").first).to_be_visible()
 
 
-@pytest.mark.long
 def test_an_exchange_that_broke_off_comes_back_and_says_so(laptop: Page, axis: Bench) -> None:
     """The host process is replaced by itself; what is shown meanwhile is as text."""
     page, segment = laptop, axis.station.drives.segments[URL]

@@ -14,7 +14,7 @@ from tests.browser.conftest import LAPTOP, _open
 from tests.browser.driving import open_axis
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 #: Of the arm while the motor is held.
 MODE_HZ = 8.0
@@ -59,7 +59,6 @@ def axis(station: Station) -> str:
     return station.add(1, tuning.URL, name="Arm")
 
 
-@pytest.mark.long
 def test_a_shaper_is_verified_and_shown(page: Page, station: Station, axis: str) -> None:
     # The slow mode needs no faster cycle, and the computer of the tests has less to do.
     cycle = {"url": tuning.URL, "cycle_us": 4000}
@@ -85,7 +84,6 @@ def test_a_shaper_is_verified_and_shown(page: Page, station: Station, axis: str)
     expect(played).to_contain_text("/")
 
 
-@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "指令整形")

@@ -15,6 +15,8 @@ from tests.browser.driving import REPORTED_MS, Bench, open_axis
 from tests.browser.test_frame import SIDEWAYS, TOO_SMALL
 from tests.support.station import Station, until
 
+pytestmark = pytest.mark.long
+
 #: A shaft under a constant torque T turns at (T - coulomb) / viscous: 60 rad/s here, 573 rpm.
 COULOMB_NM, VISCOUS_NMS, PULL_NM = 0.03, 2e-4, 0.042
 ABOUT_RPM = (PULL_NM - COULOMB_NM) / VISCOUS_NMS * 60 / 6.283185
@@ -86,7 +88,6 @@ def turned_rpm(bench: Bench) -> float:
     return float(abs(end - start) / (ended_s - began_s) * 60)
 
 
-@pytest.mark.long
 def test_an_axis_that_turns_unasked_is_reported_on_every_page(
     laptop: Page, pulled: Bench, station: Station
 ) -> None:
@@ -106,7 +107,6 @@ def test_an_axis_that_turns_unasked_is_reported_on_every_page(
     expect(note).to_have_count(0)
 
 
-@pytest.mark.long
 def test_stop_says_of_each_axis_what_was_measured(phone: Page, pulled: Bench) -> None:
     page = phone
     open_axis(page, pulled.drive, "overview")

@@ -18,7 +18,7 @@ from tests.browser.conftest import LAPTOP, PHONE, _open
 from tests.support.demo_api import DemoApi
 
 # The drives of the demo start in each, on a busy computer slowly.
-pytestmark = pytest.mark.timeout(500)
+pytestmark = [pytest.mark.timeout(500), pytest.mark.long]
 
 #: Starting all virtual drives of the demo takes some seconds, on a busy computer many.
 START_S = 120.0
@@ -91,7 +91,6 @@ def press(page: Page, name: str) -> None:
     card(page).get_by_role("button", name=name, exact=True).click()
 
 
-@pytest.mark.long
 def test_the_demo_opens_on_an_ethercat_axis_with_a_load(demo: Demo, laptop: Page) -> None:
     drives = demo.ask("/drives")
     assert [drive["ports"][0]["kind"] for drive in drives] == ["ethercat"] * 3
@@ -105,7 +104,6 @@ def test_the_demo_opens_on_an_ethercat_axis_with_a_load(demo: Demo, laptop: Page
     assert demo.jobs() == []
 
 
-@pytest.mark.long
 def test_the_tour_by_itself_moves_nothing_and_can_be_left(demo: Demo, phone: Page) -> None:
     page = phone
     before = demo.fresh()["position"]
@@ -139,7 +137,6 @@ def test_the_tour_by_itself_moves_nothing_and_can_be_left(demo: Demo, phone: Pag
     expect(card(page)).to_have_count(0)
 
 
-@pytest.mark.long
 def test_the_tour_speaks_chinese(demo: Demo, phone: Page) -> None:
     phone.evaluate("localStorage.setItem('servodeck.language', 'zh')")
     phone.reload()

@@ -21,7 +21,7 @@ from tests.browser.driving import MOVING_RPM, open_axis
 from tests.browser.tuning import COULOMB, INERTIA, MEASURED_MS, RESONANCE_HZ, confirm, row
 from tests.support.station import HANG_S, Station, until
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,6 @@ def open_sections(page: Page) -> list[str]:
     return [str(each).removeprefix("step-") for each in found]
 
 
-@pytest.mark.long
 def test_only_the_present_step_is_open(page: Page, axis: str) -> None:
     open_axis(page, axis, "overview")
     open_axis(page, axis, "tune")
@@ -90,7 +89,6 @@ def test_only_the_present_step_is_open(page: Page, axis: str) -> None:
     assert open_sections(page) == ["automatic", "manual", "verify"]
 
 
-@pytest.mark.long
 def test_identify(page: Page, axis: str, station: Station) -> None:
     expect_step(page, "Pre-checks", "done")
     expect_step(page, "Inertia", "next")
@@ -113,7 +111,6 @@ def test_identify(page: Page, axis: str, station: Station) -> None:
     assert open_sections(page) == ["manual", "response"]
 
 
-@pytest.mark.long
 def test_measure_before(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "response")
     tuning.short_sweeps(page)
@@ -123,7 +120,6 @@ def test_measure_before(page: Page, axis: str, station: Station) -> None:
     assert tuning.number_in(read, "Hz") == pytest.approx(RESONANCE_HZ, rel=0.01)
 
 
-@pytest.mark.long
 def test_place_write_and_take_back_a_notch(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "response")
     stored = page.locator("li.measured", has_text="Mechanics").first
@@ -140,7 +136,6 @@ def test_place_write_and_take_back_a_notch(page: Page, axis: str, station: Stati
     assert notches_of(station, axis) == []
 
 
-@pytest.mark.long
 def test_step_before(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "tune")
     tuning.open_step(page, "verify")
@@ -170,7 +165,6 @@ def test_design_and_apply(page: Page, axis: str, station: Station) -> None:
     expect_step(page, "Verify", "next|open")
 
 
-@pytest.mark.long
 def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: Station) -> None:
     open_axis(page, axis, "response")
     tuning.measure(page, station, axis, "Speed loop")
@@ -194,7 +188,6 @@ def test_verify_over_the_measurement_of_before(page: Page, axis: str, station: S
     expect(head).to_contain_text("before", timeout=MEASURED_MS)
 
 
-@pytest.mark.long
 def test_report(page: Page, axis: str) -> None:
     open_axis(page, axis, "tune")
     # Verified by hand: nobody has tuned this axis automatically.
@@ -237,7 +230,6 @@ def settings_of(station: Station, axis: str) -> tuple[object, object]:
     return gains, notches
 
 
-@pytest.mark.long
 def test_autotune_is_cancelled_while_the_axis_moves(
     page: Page, axis: str, station: Station
 ) -> None:
@@ -264,7 +256,6 @@ def details_of(page: Page, title: str) -> Locator:
     return page.locator("#step-automatic .stack details", has=summary)
 
 
-@pytest.mark.long
 def test_autotune_shows_designs_and_writes_nothing_unasked(
     page: Page, axis: str, station: Station
 ) -> None:

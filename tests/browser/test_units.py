@@ -10,8 +10,9 @@ from playwright.sync_api import Page, expect
 from tests.browser.driving import Bench, open_axis
 from tests.support.station import until
 
+pytestmark = pytest.mark.long
 
-@pytest.mark.long
+
 def test_a_screw_becomes_a_gear_and_is_taken_back(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("6092:01")
@@ -61,7 +62,6 @@ def _move_in_millimetres(page: Page, bench: Bench) -> None:
     expect(target).to_have_value("")
 
 
-@pytest.mark.long
 def test_what_cannot_be_is_said_before_it_is_written(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
@@ -75,7 +75,6 @@ def test_what_cannot_be_is_said_before_it_is_written(laptop: Page, bench: Bench)
     expect(page.get_by_text("the ratio contains π")).to_be_visible()
 
 
-@pytest.mark.long
 def test_a_gain_is_written_and_undone(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("2005:03")
@@ -96,7 +95,6 @@ def test_a_gain_is_written_and_undone(laptop: Page, bench: Bench) -> None:
     until(lambda: bench.raw("2005:03") == before, what="it is as before")
 
 
-@pytest.mark.long
 def test_a_stop_option_is_chosen_in_words(laptop: Page, bench: Bench) -> None:
     page = laptop
     before = bench.raw("605D:00")
@@ -110,7 +108,6 @@ def test_a_stop_option_is_chosen_in_words(laptop: Page, bench: Bench) -> None:
     bench.write("605D:00", before)
 
 
-@pytest.mark.long
 def test_the_resistor_of_the_manuals_example(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
@@ -126,7 +123,6 @@ def test_the_resistor_of_the_manuals_example(laptop: Page, bench: Bench) -> None
     expect(page.get_by_text(re.compile("This exceeds the built-in and external"))).to_be_visible()
 
 
-@pytest.mark.long
 def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "setup")
@@ -136,7 +132,6 @@ def test_the_course_of_the_brake_is_drawn(laptop: Page, bench: Bench) -> None:
     expect(picture).to_contain_text("50 ms")
 
 
-@pytest.mark.long
 def test_the_watch_list_is_live_and_stays(laptop: Page, bench: Bench) -> None:
     page = laptop
     open_axis(page, bench.drive, "overview")

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page, expect
 from tests.browser import tuning
 from tests.support.station import Station
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.long]
 
 #: Periods per revolution of the motor, and of what does not turn with its shaft.
 COGGING, PLACE = 36, 7.3
@@ -61,7 +61,6 @@ def axis(station: Station) -> str:
     return axis
 
 
-@pytest.mark.long
 def test_orders_are_found_with_where_they_come_from(
     page: Page, station: Station, axis: str
 ) -> None:
@@ -85,13 +84,11 @@ def test_orders_are_found_with_where_they_come_from(
     tuning.expect_within_the_screen(page)
 
 
-@pytest.mark.long
 def test_the_report_has_the_map_in_both_languages(station: Station, axis: str) -> None:
     for language, words in (("en", "Order per revolution"), ("zh", "每转阶次")):
         assert words in tuning.report_of(station, axis, language)
 
 
-@pytest.mark.long
 def test_the_result_on_a_phone_in_chinese(browser: Browser, station: Station, axis: str) -> None:
     with tuning.chinese_phone(browser, station) as phone:
         panel = tuning.open_panel(phone, axis, "振动-速度图谱")

@@ -89,7 +89,7 @@ def written(scheme: str, place: str) -> list[str]:
             start + place.replace("?", "#"), f"{start}{once}?timeout_ms=500"]  # fmt: skip
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_no_url_of_pyserial_is_an_adapter(

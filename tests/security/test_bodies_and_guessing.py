@@ -302,6 +302,7 @@ EVIL = ["../x", "..", "../../etc/passwd", "..%2f..%2fetc%2fpasswd", "/etc/passwd
         "x" * 300]  # fmt: skip
 
 
+@pytest.mark.long(keep=11)
 @pytest.mark.parametrize("name", EVIL, ids=repr)
 def test_a_file_name_leads_nowhere_else(server: GuardedServer, cast: Cast, name: str) -> None:
     outside = {p for p in Path(server.folder).parent.rglob("*") if server.folder not in p.parents}

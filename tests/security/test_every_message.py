@@ -78,7 +78,7 @@ def expected(kind: str, rights: frozenset[Right]) -> bool:
     return need in rights
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("who", ["administrator", "operator", "viewer", "guest", "reader"])
 def test_everybody_sends_what_they_may_and_nothing_else(
     server: GuardedServer, cast: Cast, who: str

@@ -56,6 +56,7 @@ def test_every_route_is_declared_and_nothing_else(server: GuardedServer) -> None
     assert declared - own - set(operations(server)) == set(), "no such route any more"
 
 
+@pytest.mark.long
 def test_nobody_gets_in(guarded: GuardedServer) -> None:
     # A server of its own: so many requests use up what an address without a login may ask.
     stranger = Caller(guarded)
@@ -402,6 +403,7 @@ def test_a_role_taken_away_is_gone_with_the_next_request(server: GuardedServer) 
         assert _closed(page) == 4401
 
 
+@pytest.mark.long
 def test_a_cookie_of_another_station_is_nobody(
     server: GuardedServer, cast: Cast, tmp_path_factory: pytest.TempPathFactory
 ) -> None:

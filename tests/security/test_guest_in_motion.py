@@ -97,6 +97,7 @@ def test_a_visit_that_ends_in_a_dwell_ends_it(guarded: GuardedServer, invitation
     require_ended(guarded, job)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("connection", [None, "page-of-guest"])
 def test_an_axis_that_a_guest_left_enabled_loses_its_power_with_the_button(
     guarded: GuardedServer, invitation: str, connection: str | None

@@ -42,6 +42,7 @@ BODIES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("method", "path", "body"), BODIES, ids=lambda part: ascii(part)[:40])
 def test_half_a_character_is_refused(
     cast: Cast, method: str, path: str, body: dict[str, object]

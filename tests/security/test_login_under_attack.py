@@ -174,6 +174,7 @@ def test_a_browser_that_was_here_gets_in_while_its_name_is_guessed(server: Guard
         assert browser.post("/session", json=other).status_code == 429
 
 
+@pytest.mark.long
 def test_a_known_browser_is_no_stranger_at_the_gate(server: GuardedServer) -> None:
     """A crowd of requests of nobody from its address does not keep the log-in page from it."""
     device = server.people.accounts.devices.issue(1)

@@ -226,7 +226,7 @@ def loaded(scene: Scene, caller: Caller, file: str, keys: list[str]) -> dict[str
     return {row["key"]: row for row in result["rows"]} | {"": result}
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("way", ["set", "csv", "undo"])
 def test_no_set_moves_the_axis(scene: Scene, way: str) -> None:
     """A set, a CSV list and the undo of a set, loaded by a script with the right to write."""
@@ -304,6 +304,7 @@ def test_the_command_line_moves_nothing(
     scene.require_still(f"command line, {where}")
 
 
+@pytest.mark.long(keep=2)
 def test_a_visit_that_is_over_leaves_nothing_turning(scene: Scene) -> None:
     """What was found: the axis turned on after the visit, and after the end of the server."""
     guest = scene.callers["guest with parameters"]

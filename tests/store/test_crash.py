@@ -237,6 +237,7 @@ def test_the_server_of_the_database_may_go_and_come_back(
     store.close()
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("full", ["library", "audit"])
 def test_a_full_disk_is_reported_and_leaves_everything_whole(full: str, tmp_path: Path) -> None:
     """SQLite's own limit of pages answers SQLITE_FULL, as a full disk does."""

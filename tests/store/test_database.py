@@ -21,6 +21,7 @@ from backend.foundation.store.database import DatabaseFailed, Store
 from backend.foundation.store.library_tables import Item
 
 
+@pytest.mark.long(keep=1)
 def test_migrations_and_models_agree(store: Store) -> None:
     with store.open().connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})

@@ -37,6 +37,7 @@ def names(library: Library, **wanted: object) -> list[str]:
     return [entry.name for entry in library.search(Query(**wanted))[0]]
 
 
+@pytest.mark.long(keep=1)
 def test_every_save_is_a_version_that_stays(library: Library, reported: list[Fact]) -> None:
     first = library.add("set", "x.sdset", b"one", Addition(X, author="Anna"))
     second = library.add("set", "x.sdset", b"two", Addition(X, author="Bert", notes="stiffer"))

@@ -1,8 +1,9 @@
-"""The marker ``long``: tests that ``make test`` leaves to ``make test-long``.
+"""The marker ``long``: tests that ``make test`` leaves out; ``make test-long`` runs them all.
 
 ``@pytest.mark.long`` leaves a test out; with ``keep=2`` its first two cases stay, with
-``keep=["ds_c"]`` the cases of these ids. ``--long`` says what runs: ``without`` (make test),
-``only`` (make test-long), or ``all``, which is what pytest does when it is called by hand.
+``keep=["ds_c"]`` the cases of these ids. Where tests of a file follow one another, the whole file
+is long. ``--long`` says what runs: ``without`` (make test) or ``all``, as when pytest is called by
+hand.
 """
 
 from __future__ import annotations
@@ -12,21 +13,21 @@ from typing import Any
 
 import pytest
 
-MARKER = "long(keep=0): left to `make test-long` but for its first cases, or those of the ids kept"
+MARKER = "long(keep=0): not in `make test` but for its first cases, or those of the ids kept"
 
 
 def add_option(parser: pytest.Parser) -> None:
     """Add ``--long`` to the command line of pytest."""
     parser.addoption(
         "--long",
-        choices=("all", "without", "only"),
+        choices=("all", "without"),
         default="all",
         help="whether tests with the marker `long` run; `make test` runs without them",
     )
 
 
 def long_ones(items: list[pytest.Item]) -> list[pytest.Item]:
-    """Those that are left to ``make test-long``, in their order."""
+    """Those that ``make test`` leaves out, in their order."""
     cases: Counter[str] = Counter()
     found = []
     for item in items:
@@ -55,12 +56,11 @@ class LongSuite:
         """Deselect what ``--long`` leaves out."""
         if self._which == "all":
             return
-        long = set(long_ones(items))
-        wanted = self._which == "only"
-        left_out = [item for item in items if (item in long) != wanted]
+        left_out = long_ones(items)
         self._left_out = len(left_out)
         config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if (item in long) == wanted]
+        long = set(left_out)
+        items[:] = [item for item in items if item not in long]
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         """A worker of pytest-xdist passes its count on; each worker collects every test."""

@@ -252,6 +252,7 @@ def _called(node: ast.AST) -> str:
     return str(getattr(node.func, "id", getattr(node.func, "attr", "")))
 
 
+@pytest.mark.long
 def test_no_error_carries_a_sentence() -> None:
     """What an error says and advises comes from the catalogue, so that it has both languages."""
     found = []

@@ -61,6 +61,7 @@ def test_the_first_move_arrives_although_the_brake_opens_slowly(family: str) -> 
     run_simulated(main)
 
 
+@pytest.mark.long
 def test_a_sequence_begins_with_its_first_place() -> None:
     async def main() -> None:
         async with rig("r6l", free_axis(brake=True)) as bench:

@@ -41,7 +41,7 @@ BRAKE_DOORS = {
 }  # fmt: skip
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(("family", "motion", "trouble"), PART)
 def test_stop_lets_no_load_fall(family: str, motion: str, trouble: str) -> None:
     found = vertical.run_vertical(family, motion, trouble)

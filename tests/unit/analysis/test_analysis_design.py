@@ -54,7 +54,7 @@ def true_loop(mechanics, candidate, f):
 F = np.unique(np.concatenate([np.geomspace(1.0, 6000.0, 3000), np.linspace(60, 600, 3000)]))
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("mechanics", [RIGID, STIFF, COMPLIANT, SHARP], ids=range(4))
 def test_promises_hold_on_the_true_axis(mechanics):
     table = designed(mechanics)

@@ -31,7 +31,7 @@ def matches(found, mechanics, low_hz, high_hz):
             assert near[1] == pytest.approx(z, rel=0.15)
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("mechanics", [RIGID, ONE, THREE, STIFF, VERTICAL], ids=range(5))
 def test_torque_mode_at_4_khz(mechanics):
     m = measure(mechanics, 4000.0)
@@ -45,7 +45,7 @@ def test_torque_mode_at_4_khz(mechanics):
     matches(found, mechanics, 20.0, 1000.0 if len(mechanics.loads) < 3 else 300.0)
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("mechanics", [RIGID, ONE, TWO, THREE, HEAVY], ids=range(5))
 def test_torque_mode_at_1_khz_direct_and_model(mechanics):
     m = measure(mechanics, 1000.0)
@@ -144,7 +144,7 @@ def test_periods_with_a_gap_are_left_out():
         )
 
 
-@pytest.mark.long(keep=5)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 @pytest.mark.parametrize("delay_s", [0.0, 0.3e-3, 2.25e-3])
 def test_sampled_command_is_the_exact_response_of_hold_and_lag(hold, delay_s):
@@ -203,6 +203,7 @@ def test_closed_loop_response_of_the_speed_loop():
     assert np.median(np.abs(np.degrees(np.angle(ratio)))) < 1.5
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("reported_nm", [None, 0.04])
 def test_friction_is_taken_out_of_a_closed_speed_loop(reported_nm):
     """A soft loop that is moved to and fro slows down by friction: no gain of a linear loop."""

@@ -28,7 +28,7 @@ def axis(ratio, **kwargs):
     return Mechanics(MOTOR, loads, 2e-4, 0.05, **kwargs)
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("rate", [1000.0, 4000.0])
 @pytest.mark.parametrize("ratio", [0, 1, 5, 15, 30, 60])
 def test_inertia_and_friction_within_the_required_accuracy(ratio, rate):
@@ -77,6 +77,7 @@ def reasons(*args, **kwargs):
     return found.reasons
 
 
+@pytest.mark.long
 def test_wrong_situations_are_named():
     mechanics = axis(5)
     path, run = moved(mechanics)

@@ -60,7 +60,7 @@ def fan_on_an_arm(angle, speed):
     return arm(angle, speed) + fan(angle, speed)
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ratio", [1, 10])
 @pytest.mark.parametrize("noise_nm", [0.002, 0.02])
 @pytest.mark.parametrize("torque_of", [unbalanced, arm, spring, fan, fan_on_an_arm])
@@ -76,6 +76,7 @@ def test_inertia_and_friction_are_found_beside_it(torque_of, noise_nm, ratio):
         assert result.viscous_nms.low <= VISCOUS <= result.viscous_nms.high
 
 
+@pytest.mark.long
 def test_what_it_is_and_how_large_is_reported():
     place = found(2 * MOTOR, unbalanced).load_terms
     assert place.place_nm == pytest.approx(0.1, rel=0.05)
@@ -98,7 +99,7 @@ def hose(angle, _speed):
     return 0.02 * force
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ratio", [1, 8, 25])
 def test_a_hose_that_yields_is_friction_and_no_inertia(ratio):
     inertia = MOTOR * (1 + ratio)
@@ -111,6 +112,7 @@ def test_a_hose_that_yields_is_friction_and_no_inertia(ratio):
     assert result.load_terms.place_nm == 0.0
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("order", [1, 2])
 def test_an_inertia_that_varies_by_the_position_is_neither_friction_nor_place(order):
     def crank(angle, speed):
@@ -127,7 +129,7 @@ def test_an_inertia_that_varies_by_the_position_is_neither_friction_nor_place(or
     assert result.load_terms.place_nm == 0.0
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("ratio", [0, 1, 10, 30])
 @pytest.mark.parametrize("noise_nm", [0.0005, 0.002, 0.02])
 def test_nothing_is_seen_where_nothing_is(ratio, noise_nm):
@@ -156,6 +158,7 @@ def test_friction_that_drives_is_no_answer():
     assert "negative-friction" in result.reasons
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ratio", [1, 10])
 def test_cogging_is_neither_play_nor_the_machine_s(ratio):
     inertia = MOTOR * (1 + ratio)
@@ -166,6 +169,7 @@ def test_cogging_is_neither_play_nor_the_machine_s(ratio):
     assert result.load_terms.place_nm == 0.0
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("ratio", [1, 10])
 def test_static_friction_is_no_inertia(ratio):
     def static(_angle, speed):

@@ -77,6 +77,7 @@ def test_bandwidth_is_counted_from_standstill_wherever_the_lowest_line_lies():
     assert np.abs(value / (1 + value)) == pytest.approx(10 ** (-3.0103 / 20), rel=1e-3)
 
 
+@pytest.mark.long
 def test_step_metrics_of_a_second_order_step():
     zeta, wn = 0.3, TURN * 10.0
     t = np.linspace(0.0, 1.0, 100_001)

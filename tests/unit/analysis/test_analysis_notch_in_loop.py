@@ -87,7 +87,7 @@ FREQUENCY_HZ = LINES * RATE / PERIOD
 PLAIN = played(None)
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(
     "truth", [Notch(240.0, 120.0, -30.0), Notch(240.0, 36.0, -14.0), Notch(150.0, 240.0, -8.0)]
 )

@@ -47,7 +47,7 @@ def records_of(case):
     )
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cycles", "interpolates"), [(0.0, True), (1.0, False), (1.5, False), (2.4, True)]
 )

@@ -104,6 +104,7 @@ def test_the_gain_of_a_speed_loop_is_read_from_what_it_makes_of_its_reference(lo
     assert known.c1 == pytest.approx(corner * known.c0, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_torque_that_does_not_follow_its_reference_has_no_gain():
     records = tuple(
         replace(r, torque=-r.torque) for r in records_of(case_of(1000.0, late_steps=20))

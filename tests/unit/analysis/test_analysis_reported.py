@@ -149,7 +149,7 @@ def test_a_speed_that_no_lag_explains_is_not_used(reported, filter_hz):
     assert e.phase_deg < 0.5
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("filter_hz", [300.0, 1000.0])
 def test_a_speed_behind_one_lag_is_used(filter_hz):
     a = float(np.exp(-TURN * filter_hz / (FINER * RATE)))

@@ -94,6 +94,7 @@ def test_a_balance_that_leaves_realisations_less_alike_is_not_believed(rubbed, m
     assert np.median(again.frf.std_deg) > np.median(found.frf.std_deg)
 
 
+@pytest.mark.long
 def test_speed_and_position_together_leave_no_first_image():
     """What swings beyond the band of a heavy load folds 2° and more onto the speed's lines."""
     case = _case(Mechanics(5e-5, ((1.5e-3, 300.0, 0.05),), 1e-3, 0.06))
@@ -166,7 +167,7 @@ def test_a_damping_that_is_not_known_to_half_of_itself_may_be_none():
     assert high == pytest.approx(0.04352)
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_motor_alone_has_no_resonance(seed):
     case = _case(Mechanics(5e-5, (), 2e-4, 0.03), 10.0)

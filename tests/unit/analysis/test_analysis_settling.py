@@ -19,6 +19,7 @@ RINGING = Mechanics(
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rate", [1000.0, 4000.0])
 def test_a_ringing_axis_is_measured_as_if_it_had_settled(rate):
     drive = Drive(RATED_NM, 3 * RATED_NM, 1000.0, speed_filter_hz=1000.0)

@@ -137,6 +137,7 @@ def test_without_noise_the_response_is_that_of_the_equations_of_motion(off_centr
     assert np.max(np.abs(found.response - truth) / np.abs(truth)) < 1e-6
 
 
+@pytest.mark.long
 def test_torques_that_the_loops_make_of_noise_do_not_bias_the_response():
     """Y/U of one axis alone comes to the inverse of the controller where noise is large."""
     plant = Gantry()
@@ -232,7 +233,7 @@ def test_common_and_differential_motion_of_a_symmetric_gantry_are_apart():
     assert abs(found.response[0, 0, 0] / rigid - 1.0) < 0.02
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     "plant",
     [
@@ -293,6 +294,7 @@ def test_intervals_of_modes_inertia_and_skew_stiffness_hold_the_truth_in_95_of_1
     assert np.all(covered >= 0.9), covered
 
 
+@pytest.mark.long
 def test_a_beam_that_turns_freely_has_no_skew_stiffness():
     plant = Gantry(yaw_stiffness=0.0, yaw_damping=0.0)
     found = find_modes(estimate(records(plant, np.random.default_rng(8))))

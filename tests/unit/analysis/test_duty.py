@@ -146,6 +146,7 @@ MOTORS = {
 }
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("name", MOTORS)
 def test_the_range_holds_for_motors_of_other_physics(name: str) -> None:
     """Four bodies, convection and iron by other laws: when they are too warm is in the range, and

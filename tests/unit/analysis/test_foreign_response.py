@@ -115,7 +115,7 @@ ROUGH = [
 ]  # fmt: skip
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @pytest.mark.parametrize("number", range(len(ROUGH)))
 def test_the_band_holds_another_run_of_a_rough_bench(number: int) -> None:
     bench = ROUGH[number]
@@ -203,7 +203,7 @@ def test_what_supports_no_answer_says_why() -> None:
         evaluate(rng.normal(size=100), rng.normal(size=100), RATE)
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("kind", ["white", "random walk", "slow input", "chirp"])
 @pytest.mark.parametrize("n", [4000, 20000])
 def test_an_output_without_relation_to_the_input_has_no_response(kind: str, n: int) -> None:
@@ -221,6 +221,7 @@ def test_an_output_without_relation_to_the_input_has_no_response(kind: str, n: i
             evaluate(u, y, RATE)
 
 
+@pytest.mark.long
 def test_the_band_ends_where_the_output_no_longer_follows() -> None:
     """An inertia whose motion sinks into the noise of its sensor at about 60 Hz."""
     rng = np.random.default_rng(3)

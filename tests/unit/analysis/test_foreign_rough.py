@@ -93,6 +93,7 @@ def test_a_position_that_wanders_keeps_its_lines() -> None:
     assert np.median(1.96 * found.std_db) < 2.0
 
 
+@pytest.mark.long
 def test_what_lies_above_the_band_does_not_count_within_it() -> None:
     """A speed of the load falls below the digits of its file; up to 250 Hz all is exact."""
     rate = 8000
@@ -186,6 +187,7 @@ def test_a_lead_beside_a_fast_pole_does_not_refute_one_shaft() -> None:
     assert path_delay_s(ProductModel(12.0, 0.3e-3, (5.8, 872.0)), None) == pytest.approx(0.3e-3)
 
 
+@pytest.mark.long
 def test_torque_and_speed_of_one_shaft_are_never_refuted_by_the_fit_alone() -> None:
     """Torque behind a lag, sampled: all lines lie within ±90°, whatever model describes them."""
     rate, fine = 2500, 8

@@ -56,6 +56,7 @@ def found(by_place: float, noise: float = 1e-3) -> InertiaByPlace | None:
     return inertia_by_place(tuple(records), path, "torque_mode", 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("share", [0.03, 0.1])
 def test_an_inertia_by_place_is_found_with_its_size(share: float) -> None:
     reported = found(share * J0)

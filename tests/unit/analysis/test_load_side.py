@@ -56,6 +56,7 @@ def test_stiffness_is_within_ten_percent_in_nine_of_ten_axes() -> None:
     assert all(abs(value.value / c.axis.stiffness - 1.0) < 0.25 for c, value in found)
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_in_nine_of_ten_axes() -> None:
     gaps = [holds(each.backlash_rad, c.axis.gap_rad) for c, each in campaign() if each.backlash_rad]
     stiff = [
@@ -76,6 +77,7 @@ def test_the_error_of_an_eccentric_encoder_is_seen_once_per_revolution() -> None
         assert first.value == pytest.approx(truth, abs=max(0.05 * truth, 2 * case.count_rad))
 
 
+@pytest.mark.long
 def test_friction_that_keeps_the_load_on_its_flank_hides_the_gap() -> None:
     case = drawn(3)
     heavy = replace(
@@ -92,6 +94,7 @@ def test_friction_that_keeps_the_load_on_its_flank_hides_the_gap() -> None:
     assert found.lost_motion_rad.value == pytest.approx(truth, rel=0.05)
 
 
+@pytest.mark.long
 def test_a_pull_that_holds_the_flank_leaves_both_open() -> None:
     case = drawn(4)
     hanging = replace(case.axis, pull=0.3 * case.rated_nm, gap_rad=5e-3, counts=2**18)
@@ -101,6 +104,7 @@ def test_a_pull_that_holds_the_flank_leaves_both_open() -> None:
     assert found.twist_s2 is None
 
 
+@pytest.mark.long
 def test_no_whole_revolution_of_the_load_is_said() -> None:
     case = drawn(5)
     geared = Case(

@@ -95,6 +95,7 @@ def test_insensitivity_at_five_percent_is_the_printed_one(kind: Kind, printed: f
     assert (high - low) / 8.0 == pytest.approx(printed, abs=0.005)
 
 
+@pytest.mark.long(keep=6)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("real_hz", "real_damping"), [(8.0, 0.02), (7.4, 0.01), (8.9, 0.06)])
 def test_prediction_is_what_an_oscillator_does(

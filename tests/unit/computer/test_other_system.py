@@ -40,6 +40,7 @@ def test_the_server_starts_and_answers() -> None:
     assert other("serve").splitlines()[-1].startswith("drives 200")
 
 
+@pytest.mark.long
 def test_ethercat_without_npcap_is_refused_with_the_way_to_it() -> None:
     said = other("ethercat")
     assert "EtherCAT on Windows needs Npcap" in said
@@ -50,6 +51,7 @@ def test_one_process_at_a_time_has_a_state_folder() -> None:
     assert other("locks").split() == ["first", "True", "second", "0", "third", "1"]
 
 
+@pytest.mark.long(keep=6)
 @pytest.mark.parametrize("module", ["fcntl", "termios", "pty", "resource", "pwd", "grp", "tty"])
 def test_the_stand_in_really_lacks_what_is_absent(module: str) -> None:
     """Else the tests above would show nothing."""

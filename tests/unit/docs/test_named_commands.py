@@ -43,7 +43,7 @@ def options_of(parameter: object) -> list[str]:
     return [*getattr(parameter, "opts", ()), *getattr(parameter, "secondary_opts", ())]
 
 
-@pytest.mark.long(keep=75)
+@pytest.mark.long(keep=39)
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_of_a_page(page: str) -> None:
     bad = [

@@ -52,6 +52,7 @@ def test_two_records_of_a_term_are_refused(terms: ModuleType, tmp_path: Path) ->
         terms.load(file)
 
 
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(
     ("line", "found"),
     [

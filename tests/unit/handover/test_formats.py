@@ -148,7 +148,7 @@ def test_sizes_and_byte_order_are_those_of_the_type() -> None:
     assert fromstring(xml).findtext(".//Data") == "40420f00"
 
 
-@pytest.mark.long(keep=15)
+@pytest.mark.long(keep=6)
 @pytest.mark.parametrize("form", [form for form in FORMATS if form != "python"])
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_list_reads_back_and_is_exported_again_byte_by_byte(family: str, form: Format) -> None:
@@ -254,6 +254,7 @@ ROS2_TOP = {"vendor_id", "product_id", "assign_activate", "auto_fault_reset", "s
 ROS2_TYPES = {"bool", "uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64"}
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_ros2_follows_the_documented_fields(family: str) -> None:
     axis = axis_of(family)
@@ -275,6 +276,7 @@ def test_ros2_follows_the_documented_fields(family: str) -> None:
             assert not ("command_interface" in channel and "state_interface" in channel)
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_init_commands_have_the_fields_of_etg_2100(family: str) -> None:
     fields = ["Transition", "Comment", "Timeout", "Ccs", "Index", "SubIndex", "Data"]

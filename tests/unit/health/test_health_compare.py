@@ -28,7 +28,7 @@ from tests.unit.health.drawn_checks import (
 )
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @pytest.mark.parametrize("noise", [normal, heavy, skewed, linked, by_day, sometimes_wrong])
 @pytest.mark.parametrize("wider", [1.0, 4.0])
 def test_at_most_one_false_alarm_in_a_hundred(
@@ -43,7 +43,7 @@ def test_at_most_one_false_alarm_in_a_hundred(
     assert count <= trend_compare.FALSE_ALARMS * draws
 
 
-@pytest.mark.long(keep=9)
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize("noise", [normal, heavy, skewed, linked])
 @pytest.mark.parametrize(
     ("what", "factor"),

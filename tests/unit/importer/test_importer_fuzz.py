@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from importer_samples import GOOD_EDS, GOOD_ESI, ODD_EDS
@@ -40,6 +41,7 @@ def test_any_bytes(data: bytes) -> None:
     survive(data)
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=150)
 @given(st.randoms(use_true_random=False), st.booleans())
 def test_damaged_files(chance: random.Random, eds: bool) -> None:
@@ -56,6 +58,7 @@ def test_damaged_files(chance: random.Random, eds: bool) -> None:
     survive(bytes(data))
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=150)
 @given(st.data())
 def test_odd_values_in_eds_files(data: st.DataObject) -> None:
@@ -68,6 +71,7 @@ def test_odd_values_in_eds_files(data: st.DataObject) -> None:
     survive("\n".join(lines).encode("utf-8", "replace"))
 
 
+@pytest.mark.long
 @settings(deadline=None, max_examples=150)
 @given(st.data())
 def test_odd_values_in_esi_files(data: st.DataObject) -> None:

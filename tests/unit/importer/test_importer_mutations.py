@@ -101,6 +101,7 @@ def taken(read: Callable[[], T]) -> T | Exception:
         assert time.process_time() - begun < LIMIT_S
 
 
+@pytest.mark.long(keep=118)
 @by_case
 @pytest.mark.parametrize("whole", [EDS, ESI], ids=["eds", "esi"])
 def test_a_damaged_description_makes_a_sound_profile_or_is_refused(

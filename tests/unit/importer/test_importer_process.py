@@ -135,6 +135,7 @@ def test_controllers_come_out_of_the_process_as_they_went_in() -> None:
     assert [(each.assign_activate, each.shift_ns) for each in found] == [(0x330, 250_000)] * 2
 
 
+@pytest.mark.long
 def test_refusals_of_the_process_are_those_of_the_reader() -> None:
     def refused(data: bytes, product: int) -> tuple[NotAllowed, NotAllowed]:
         with pytest.raises(NotAllowed) as here:

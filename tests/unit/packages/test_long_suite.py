@@ -1,4 +1,4 @@
-"""Which tests `make test` leaves to `make test-long`: together the two run each test once."""
+"""Which tests `make test` leaves out."""
 
 from __future__ import annotations
 
@@ -53,9 +53,7 @@ class Seen:
             self.tests.append(report.nodeid.partition("::")[2])
 
 
-@pytest.mark.parametrize(
-    ("which", "expected"), [("without", SHORT), ("only", LONG), ("all", SHORT | LONG)]
-)
+@pytest.mark.parametrize(("which", "expected"), [("without", SHORT), ("all", SHORT | LONG)])
 def test_each_suite_runs_its_tests(
     pytester: pytest.Pytester, which: str, expected: set[str]
 ) -> None:

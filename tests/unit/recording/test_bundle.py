@@ -70,6 +70,7 @@ VOLTAGE = load_profile("mms7").parameter("6079:00").name
 OVER_VOLTAGE = next(f for f in load_profile("mms7").faults if f.code == "0x3210")
 
 
+@pytest.mark.long
 def test_bundle_holds_the_samples_as_a_recording(tmp_path: Path) -> None:
     head = header(2, 1)
     axis = {

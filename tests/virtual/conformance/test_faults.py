@@ -373,6 +373,7 @@ def test_stall_of_the_r6l_can_be_switched_off() -> None:
 OVERLOAD = [("r6l", "AL.245"), ("ep3e", "Err16"), ("ds_c", "1007")]
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(("name", "code"), OVERLOAD)
 def test_overload_at_twice_the_rated_torque(name: str, code: str) -> None:
     """I²t: a weight of 1.9 times the rated torque is held for a while, and no longer."""
@@ -556,7 +557,7 @@ def every_entry() -> list[tuple[str, str]]:
     ]
 
 
-@pytest.mark.long(keep=23)
+@pytest.mark.long(keep=22)
 @pytest.mark.parametrize(("name", "code"), every_entry())
 def test_every_entry_of_every_table_can_be_raised_and_ends_as_it_says(name: str, code: str) -> None:
     d = OnWire(name, None)

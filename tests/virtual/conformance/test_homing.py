@@ -141,7 +141,7 @@ def attained(d: OnWire) -> bool:
     return bool(d.status & (1 << 8 if d.drive == "ds_c" else 1 << 12))
 
 
-@pytest.mark.long(keep=34)
+@pytest.mark.long(keep=14)
 @pytest.mark.parametrize(("name", "method", "place"), methods())
 def test_method(name: str, method: int, place: int) -> None:
     case = TORQUE.get(name, {}).get(method) or CASES[method]

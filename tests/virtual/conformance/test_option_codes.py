@@ -67,6 +67,7 @@ QUICK_STOPS: list[Any] = [
 ]  # fmt: skip
 
 
+@pytest.mark.long(keep=8)
 @pytest.mark.parametrize(("name", "option", "seconds", "state"), QUICK_STOPS)
 def test_quick_stop(name: str, option: int, seconds: float, state: int) -> None:
     d = turning(name)

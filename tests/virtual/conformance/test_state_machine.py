@@ -46,6 +46,7 @@ def go(d: OnWire, state: str) -> None:
     assert d.state == expected(d, state)
 
 
+@pytest.mark.long(keep=31)
 @pytest.mark.parametrize("name", EVERY)
 @pytest.mark.parametrize(
     ("number", "start", "word", "end"),

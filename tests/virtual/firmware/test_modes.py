@@ -476,7 +476,7 @@ def home(b: Bench, method: int) -> float:
 EDGE = 0.002
 
 
-@pytest.mark.long(keep=10)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("start", [-1.0, 0.4, 1.2])
 @pytest.mark.parametrize(
     ("method", "zero"),
@@ -493,7 +493,7 @@ def test_homing_on_switches(bench, method: int, zero: float, start: float) -> No
     assert abs(b.get("6064:00")) < 300
 
 
-@pytest.mark.long(keep=13)
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize(
     ("method", "start", "zero"),
     [

@@ -18,7 +18,7 @@ from tests.support.handed_over import EVERY, SAVED, profile_of, settings, values
 FOUND: list[Outcome] = []
 
 
-@pytest.mark.long(keep=10)
+@pytest.mark.long(keep=9)
 @pytest.mark.parametrize("form", FORMATS)
 @pytest.mark.parametrize("family", EVERY)
 def test_the_controller_takes_every_value_and_a_fresh_drive_holds_it(

@@ -32,6 +32,7 @@ from tests.support.handed_over import (
 FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "maker_a.xml", "maker_c.xml")
 
 
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize("family", FAMILIES)
 def test_every_family_runs_from_its_eni(family: str) -> None:
     axis = with_esi(family)

@@ -186,7 +186,7 @@ def answer(
 TRIED = wire_messages([text("autotune.candidate", bandwidth_hz=300.0, why=prose("too fast"))])
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("keep", [False, True])
 def test_by_a_server_a_design_is_taken_back_or_kept(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, keep: bool

@@ -141,6 +141,7 @@ async def test_a_shaft_is_stopped_where_the_brake_lets_go_altogether(
     assert way.abort_ms <= 20.0
 
 
+@pytest.mark.long
 async def test_an_open_brake_moves_by_the_preload_alone() -> None:
     """Its output is another one than the drive was reported: it follows the power stage."""
     spec = braked(2.0 * RATED_NM)
@@ -224,6 +225,7 @@ async def test_a_test_that_is_cancelled_puts_the_output_back_and_takes_the_power
         assert bench.link.highest["torque"] > 0
 
 
+@pytest.mark.long
 async def test_nobody_forces_outputs_meanwhile() -> None:
     """Function 28 lets 60FEh switch the brake's output on."""
     async with direct(braked(2.0 * RATED_NM), drive="m6l", settings=M6L) as bench:

@@ -68,6 +68,7 @@ async def test_software_limits_do_for_limit_switches_once_the_axis_is_homed(ds_c
     await profile_speed.require_travel_limits(ds_c.axis)
 
 
+@pytest.mark.long
 async def test_ramps_torque_limit_and_mode_are_changed_for_the_measurement_only(
     ds_c: CanBench,
 ) -> None:
@@ -85,6 +86,7 @@ async def test_ramps_torque_limit_and_mode_are_changed_for_the_measurement_only(
     assert await kept(ds_c) == before
 
 
+@pytest.mark.long
 async def test_cancelling_a_sweep_leaves_everything_as_it_was(ds_c: CanBench) -> None:
     before = await kept(ds_c)
     moving = asyncio.Event()

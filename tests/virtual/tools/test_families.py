@@ -155,7 +155,7 @@ def _limits(b: DirectBench) -> list[str]:
     return [key for role in roles if (key := b.axis.drive.key(role)) is not None]
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "place"),
     [

@@ -146,7 +146,7 @@ async def test_wrong_counts_are_found_before_anything_is_energised(share: float)
     assert shaft_rev(bench) == 1.0
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("drive", "coulomb_nm", "found_as"),
     [
@@ -170,6 +170,7 @@ async def test_a_shaft_that_sticks_stays_within_the_travel(
         assert abs(shaft_rev(bench)) <= 0.1
 
 
+@pytest.mark.long
 async def test_a_shaft_that_was_moved_out_of_the_travel_is_moved_back() -> None:
     """Somebody pushes it while it is measured forwards: backwards it is still not blocked."""
     async with direct(motor(), drive="r6l") as bench:
@@ -199,6 +200,7 @@ async def test_nothing_moves_without_a_statement_of_what_hangs() -> None:
         assert shaft_rev(bench) == 0.0
 
 
+@pytest.mark.long
 async def test_a_stop_meanwhile_takes_the_power_off_and_closes_no_loop() -> None:
     async with direct(motor(PhaseSpec(order="shifted")), drive="mms7") as bench:
         task: asyncio.Task[FirstPowerResult]

@@ -87,6 +87,7 @@ async def test_results_are_read_by_generated_types(client: ModuleType) -> None:
     assert len(stepped.actual) == len(stepped.time_s)  # type: ignore[attr-defined]
 
 
+@pytest.mark.long
 async def test_a_recording_is_read_by_generated_types(client: ModuleType, tmp_path: Path) -> None:
     """Samples of known values, through the interface: of the stretch that was asked for, all."""
     folder = tmp_path / "recordings"

@@ -126,6 +126,7 @@ async def test_short_travel_is_gone_to_and_fro_and_says_no_ripple() -> None:
     assert -0.3 <= low < -0.1 < 0.1 < high <= 0.3
 
 
+@pytest.mark.long
 async def test_a_torque_that_does_not_change_is_refused() -> None:
     async with direct(SMOOTH) as b:
         blocks = b.link.blocks

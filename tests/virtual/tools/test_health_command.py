@@ -128,6 +128,7 @@ def test_from_a_measurement_to_a_change(axis: Axis, tmp_path: Path) -> None:
     assert "resonance" not in trend
 
 
+@pytest.mark.long
 def test_what_is_not_there_says_so(axis: Axis, tmp_path: Path) -> None:
     assert "no database" in run("trend", "--config", str(tmp_path / "none"), code=1)
     assert "no drive named Q" in run(

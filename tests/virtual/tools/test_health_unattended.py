@@ -138,6 +138,7 @@ async def seen(station: Station) -> None:
     await until(lambda: monitor.snapshot.fresh)
 
 
+@pytest.mark.long
 async def test_a_controller_asks_and_only_what_was_permitted_runs(station: Station) -> None:
     assert await station.code("POST", "/drives/x/health/trigger") == "health.trigger-not-permitted"
     unsecured = {"until": station.now().isoformat(), "trigger": True, "person": "Ann"}
@@ -236,7 +237,7 @@ async def nobody(station: Station) -> None:
     station.people.accounts_needed = True
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(
     ("way", "code"),
     [
@@ -314,6 +315,7 @@ async def test_the_schedule_survives_a_restart_and_runs_once(station: Station) -
     assert late.permissions.all()[0].attempts[-1].outcome == "missed"
 
 
+@pytest.mark.long
 async def test_taken_back_during_a_run_the_run_ends(station: Station) -> None:
     await station.permit()
     station.hold.clear()
@@ -327,6 +329,7 @@ async def test_taken_back_during_a_run_the_run_ends(station: Station) -> None:
     assert station.bench.authority.grant_of("x") is None
 
 
+@pytest.mark.long
 async def test_stop_before_an_announced_run_prevents_it(station: Station) -> None:
     await station.permit(days=EVERY_DAY)
     station.schedule.permissions.skip(

@@ -86,7 +86,7 @@ midways = pytest.mark.parametrize(
 )
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @midways
 @pytest.mark.parametrize("trouble", ["cancelled", "faulted"])
 async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble: str) -> None:
@@ -110,7 +110,7 @@ async def test_everything_is_as_before(drive: str, tool: str, step: str, trouble
         assert not b.axis.stop_pending
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @midways
 async def test_what_a_lost_drive_is_pending_comes_back_by_itself(
     drive: str, tool: str, step: str
@@ -141,6 +141,7 @@ async def test_what_a_lost_drive_is_pending_comes_back_by_itself(
         assert not b.axis.drive.pending_restores
 
 
+@pytest.mark.long
 async def test_an_emergency_stop_that_is_released_lets_nothing_go_on() -> None:
     """DS_C has an input for it (003:514-516), which brakes without any fault."""
     async with under("ds_c") as b:

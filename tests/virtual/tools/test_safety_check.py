@@ -89,6 +89,7 @@ async def test_a_stop_by_ramp_is_ss1_and_a_coasting_one_is_not() -> None:
     assert found.verdict == "power_off_at_speed"
 
 
+@pytest.mark.long
 async def test_nothing_triggered_is_no_pass_and_limits_are_judged() -> None:
     async with direct(stiff(), drive="r6l") as bench:
         found = await recorded(bench, None)

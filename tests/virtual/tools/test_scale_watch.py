@@ -94,6 +94,7 @@ async def test_a_tenth_of_an_rpm_is_sent_as_it_is_stated(bus: str) -> None:
         assert await largest_command(b, SPIN) == 600
 
 
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize("bus", ["ethercat", "canopen"])
 @pytest.mark.parametrize(
     ("options", "means"),
@@ -298,7 +299,7 @@ async def test_a_small_move_of_a_blocked_axis_teaches_nothing() -> None:
         assert b.link.highest["torque"] <= 150 + 5
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("opens_s", [0.0, 0.3])
 async def test_a_brake_that_opens_late_is_waited_for(opens_s: float) -> None:
     """It grips with twice the rated torque for 300 ms of Operation enabled; no bit reports it."""

@@ -74,6 +74,7 @@ def begun(tool: AnyTool, b: Any) -> Any:
     return tool.run(run, tool.settings(**asked))
 
 
+@pytest.mark.long(keep=21)
 @pytest.mark.parametrize("lacks", [("60A9", "60AA"), ("6092", "608F")], ids=["unit", "resolution"])
 @pytest.mark.parametrize("kind", KINDS)
 async def test_no_tool_moves_by_a_unit_that_nobody_knows(kind: str, lacks: tuple[str, ...]) -> None:
@@ -100,7 +101,7 @@ class Played(Exception):
     """The first setpoints of a tool went out."""
 
 
-@pytest.mark.long(keep=7)
+@pytest.mark.long(keep=5)
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in REFUSED_ANYWAY])
 async def test_another_clients_feed_constant_is_that_of_the_next_motion(kind: str) -> None:
     """10 000 increments to the revolution when the drive was connected, 1 000 at the motion."""

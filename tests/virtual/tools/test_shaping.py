@@ -85,6 +85,7 @@ async def test_a_shaper_halves_the_vibration_or_the_settling_time(
     assert TOOL.reevaluate(kept["arrays"], kept["meta"]) == found
 
 
+@pytest.mark.long
 async def test_a_stiff_axis_shows_no_vibration_and_is_not_moved_again() -> None:
     async with direct(arm(400.0)) as bench:
         load = Load(bench)
@@ -96,6 +97,7 @@ async def test_a_stiff_axis_shows_no_vibration_and_is_not_moved_again() -> None:
     assert len(load.ends()) == 4
 
 
+@pytest.mark.long
 async def test_a_stated_mode_that_the_motor_does_not_show_is_designed_for_and_not_tried() -> None:
     asked = ASKED.model_copy(update={"frequency_hz": 7.0, "damping": 0.02})
     async with direct(arm(400.0), drive="m6l") as bench:

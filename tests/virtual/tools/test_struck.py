@@ -20,7 +20,7 @@ async def known_of(drive: str, spec: MechanicsSpec, *, vertical: bool) -> Known:
     return _KNOWN[drive, vertical]
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["control power", "main power"])
 @pytest.mark.parametrize(
     ("drive", "part", "number"),

@@ -85,6 +85,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[InertiaSettin
     return seen
 
 
+@pytest.mark.long
 def test_a_drive_at_a_bus_url_is_put_on_the_servers_bench(asked: list[InertiaSettings]) -> None:
     code, out, err = run("inertia", *AT, "--travel-rev", "2", "--repetitions", "3")
     assert code == 0, err
@@ -113,6 +114,7 @@ def test_a_report_of_a_drive_at_a_bus_url(asked: list[InertiaSettings], tmp_path
     assert not asked
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.usefixtures("asked")
 def test_ctrl_c_ends_with_130(monkeypatch: pytest.MonkeyPatch, number: signal.Signals) -> None:
@@ -176,6 +178,7 @@ def test_every_finding_of_a_friction_map_has_words() -> None:
     }
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("asked")
 def test_a_cycle_is_read_by_a_server_without_a_motion(tmp_path: Path) -> None:
     """An axis at standstill: nothing moved meanwhile, and that is what is said."""

@@ -112,7 +112,7 @@ async def test_limits_without_room_or_time_are_refused() -> None:
             await asked(bench, VIBRATION, MAP.model_copy(update={"slowest_rpm": 790.0}))
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["r6l", "mms7"])
 async def test_a_dwell_shows_the_impedance_of_the_chain(drive: str) -> None:
     kept = Kept()
@@ -168,7 +168,7 @@ async def test_a_dwell_beyond_the_envelope_is_refused(changed: dict[str, Any], w
         assert await bench.axis.position_raw() == home
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("ending", ["cancelled", "fault", "envelope"])
 async def test_a_dwell_ends_and_everything_is_as_before(ending: str) -> None:
     settings = VIBRATE.model_copy(update={"duration_s": 20.0})

@@ -139,7 +139,7 @@ async def test_a_torque_that_the_drive_cuts_is_reported(
             await autotune(b.axis, b.session, family.autotune(), silent())
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 async def test_start_gains_that_oscillate(family: Family) -> None:
     soft = mechanics((1e-4, 60.0, 0.0005))
@@ -190,7 +190,7 @@ async def test_a_blocked_axis(family: Family) -> None:
                 await work
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 async def test_a_first_move_grows_within_the_envelope(family: Family) -> None:
     """A blocked axis: what is tried grows no further than the envelope, and the words fit it."""
@@ -228,7 +228,7 @@ async def test_a_closed_brake_is_distinguished_from_an_axis(family: Family) -> N
             assert "brake" in (reported.value.remedy or "")
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 async def test_an_envelope_that_is_hit_ends_the_measurement(family: Family) -> None:
     narrow = Envelope(4.0, 1500.0, 20.0, 60.0)
@@ -242,7 +242,7 @@ async def test_an_envelope_that_is_hit_ends_the_measurement(family: Family) -> N
             await autotune(b.axis, b.session, family.autotune(narrow), silent())
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 @pytest.mark.parametrize("tool", ["sweep", "autotune"])
 async def test_a_drive_that_faults_while_it_is_measured(family: Family, tool: str) -> None:
@@ -292,7 +292,7 @@ async def test_a_drive_that_faults_while_the_tuned_loop_is_verified(family: Fami
         assert at.done
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 @pytest.mark.parametrize(
     ("tool", "step"),
@@ -344,7 +344,7 @@ async def test_a_link_that_is_lost_while_it_is_measured(
         assert not b.axis.drive.pending_restores
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @families
 @pytest.mark.parametrize("step", ["1 of 6", "2 of 6", "3 of 6"])
 async def test_autotune_is_cancelled_while_it_measures(family: Family, step: str) -> None:
@@ -365,7 +365,7 @@ async def test_autotune_is_cancelled_while_it_designs() -> None:
             await task
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @families
 @pytest.mark.parametrize(
     ("step", "fraction"),
@@ -389,7 +389,7 @@ async def test_autotune_is_cancelled_after_it_has_written(
             await task
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("tool", ["sweep", "inertia", "step"])
 @pytest.mark.parametrize(
     ("family", "fraction"),

@@ -56,7 +56,7 @@ async def _hold_for(hold: Hold, seconds: float) -> None:
     hold.release(END_OF_JOG["released"])
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("axis", sorted({"generic402", "ds_c"} & set(drive_names())), indirect=True)
 async def test_jog_by_short_moves(axis: Axis) -> None:
     start = await axis.position_raw()
@@ -69,6 +69,7 @@ async def test_jog_by_short_moves(axis: Axis) -> None:
     assert await axis.state() is not State.OPERATION_ENABLED
 
 
+@pytest.mark.long
 async def test_jog_with_process_data(axis: Axis) -> None:
     session = CyclicSession(axis.drive.ports[0].link, [axis.drive])
     axis.session = session

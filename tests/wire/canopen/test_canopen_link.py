@@ -118,6 +118,7 @@ def slow_reads(link: CanopenLink, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return done
 
 
+@pytest.mark.long
 async def test_a_write_overtakes_batches_of_reads(
     link: CanopenLink, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -170,6 +171,7 @@ async def test_cancelling_a_batch_waits_for_one_read_only(
     assert len(done) <= 3
 
 
+@pytest.mark.long
 async def test_a_timed_out_write_is_sent_once(bench: Bench, link: CanopenLink) -> None:
     bench.node.mute = True
     written: list[bytes] = []
@@ -369,6 +371,7 @@ async def test_a_node_that_is_not_there_is_not_asked_for_everything(link: Canope
     assert link.quality(77).timeouts == 2
 
 
+@pytest.mark.long
 async def test_many_absent_nodes_keep_no_other_waiting(bench: Bench) -> None:
     # A second is far more than a busy computer needs for the one answer that comes.
     link = CanopenLink(bench.url.replace("timeout_ms=250", "timeout_ms=1000"))

@@ -23,7 +23,7 @@ CHOSEN = (
 )  # fmt: skip
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("case", [pytest.param(c, id=c.name) for c in CASES if c.name in CHOSEN])
 async def test_the_injected_cause_comes_first(case: CanCase) -> None:
     assert (await causes_of(case))[:1] == [case.cause]
@@ -33,6 +33,7 @@ def test_the_chosen_cases_are_in_the_table() -> None:
     assert set(CHOSEN) <= {case.name for case in CASES}
 
 
+@pytest.mark.long
 async def test_a_healthy_node_reaches_operational_and_is_put_back(
     bench: Bench, link: CanopenLink
 ) -> None:
@@ -70,6 +71,7 @@ async def test_the_examination_starts_no_life_guarding(bench: Bench, link: Canop
     assert len(asked) == 1
 
 
+@pytest.mark.long
 async def test_the_bus_alone_is_examined_where_nobody_answers(bench: Bench) -> None:
     bench.node.mute = True
     link = CanopenLink(bench.url)

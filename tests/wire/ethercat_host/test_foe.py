@@ -125,6 +125,7 @@ async def test_nothing_else_is_asked_of_a_drive_that_is_being_loaded(calm: Rig) 
         await loading.works()
 
 
+@pytest.mark.long
 async def test_a_drive_without_boot_takes_the_file_in_preop(calm: Rig) -> None:
     calm.do("refuse", slave=0, state="BOOT", code=0x0013)
     try:
@@ -160,6 +161,7 @@ async def test_a_file_that_is_refused_leaves_the_drive_as_it_was(calm: Rig) -> N
         await loading.works()
 
 
+@pytest.mark.long
 async def test_a_failure_in_the_middle_says_that_there_is_no_firmware_now(calm: Rig) -> None:
     calm.do("firmware", slave=0, fail_at=1999)
     async with calm.link() as bus:

@@ -28,6 +28,7 @@ def wire(namespace: Namespace) -> Iterator[Namespace]:
         process.kill()
 
 
+@pytest.mark.long
 async def test_the_search_is_repeated(wire: Namespace) -> None:
     link = EthercatLink("ec0m", launcher=wire.command([]), lockstep=1.0)
     await link.open()

@@ -116,6 +116,7 @@ async def test_jog_in_profile_position_and_stop_without_process_data(mms7: Rig) 
         assert await number(link, ACTUAL) == pytest.approx(here, abs=50), "it stands"
 
 
+@pytest.mark.long
 async def test_a_heap_of_late_answers_is_noticed_and_none_of_them_is_used(rig: Rig) -> None:
     """SOEM's index has four bits: 16 answers too late would answer for ever."""
     async with rig.link() as bus:
@@ -132,6 +133,7 @@ async def test_a_heap_of_late_answers_is_noticed_and_none_of_them_is_used(rig: R
             assert await number(bus.link, test_link.RECORD[1]) == value
 
 
+@pytest.mark.long
 async def test_process_data_need_a_check_that_allows_the_cycle(
     rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -37,6 +37,7 @@ def quiet(_share: float, _text: str) -> None:
     pass
 
 
+@pytest.mark.long
 async def test_scan_tells_identity_place_and_state(rig: Rig) -> None:
     async with rig.link(scan=False) as bus:
         steps: list[float] = []
@@ -189,6 +190,7 @@ async def test_dying_in_the_middle_of_a_segmented_upload_does_not_hang(rig: Rig)
         assert bus.link.quality().details["host_restarts"] == 0
 
 
+@pytest.mark.long
 async def test_a_cut_cable_is_reported_and_heals_by_itself(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("cut", cable=1)
@@ -208,6 +210,7 @@ async def test_a_cut_cable_is_reported_and_heals_by_itself(rig: Rig) -> None:
         )
 
 
+@pytest.mark.long
 async def test_a_power_cycle_is_reported_and_the_drive_is_taken_up_again(rig: Rig) -> None:
     async with rig.link() as bus:
         rig.do("power_cycle", slave=1, off_s=0.4)
@@ -216,6 +219,7 @@ async def test_a_power_cycle_is_reported_and_the_drive_is_taken_up_again(rig: Ri
         assert await bus.link.read(2, STATUS) == b"\x50\x02"
 
 
+@pytest.mark.long
 @repeated
 async def test_lost_late_and_damaged_frames_cost_time_but_no_value(rig: Rig) -> None:
     async with rig.link() as bus:
@@ -286,6 +290,7 @@ async def test_the_alias_is_written_with_its_checksum(rig: Rig) -> None:
         await bus.reported("station 2", "was switched on again")
 
 
+@pytest.mark.long
 async def test_a_second_master_on_the_same_interface_is_refused(rig: Rig) -> None:
     async with rig.link():
         second = EthercatLink("ec0m", launcher=rig.namespace.command([]))

@@ -162,6 +162,7 @@ def test_nothing_is_mapped_twice_after_one_search() -> None:
         segment.map(64)
 
 
+@pytest.mark.long
 def test_a_search_takes_away_what_an_earlier_mapping_left_in_the_slaves(
     namespace: Namespace, rig: Rig
 ) -> None:

@@ -57,6 +57,7 @@ async def test_closing_leaves_the_interface_as_it_was(rig: Rig) -> None:
     assert not set_for_good(rig)
 
 
+@pytest.mark.long
 async def test_so_does_a_kill(rig: Rig) -> None:
     async with rig.link() as bus:
         host = bus.link._host
@@ -68,6 +69,7 @@ async def test_so_does_a_kill(rig: Rig) -> None:
     assert not set_for_good(rig)
 
 
+@pytest.mark.long
 async def test_what_somebody_else_switched_on_stays(rig: Rig) -> None:
     inside(rig, _SWITCH, "ec0m", "on")
     try:

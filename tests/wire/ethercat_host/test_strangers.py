@@ -176,6 +176,7 @@ async def test_a_drive_with_a_bare_eeprom_is_read_whole_and_moved_by_nobody(bus:
         await bus.link.close()
 
 
+@pytest.mark.long
 async def test_a_mapping_that_can_only_be_read_is_reported_and_left_assigned(bus: Bus) -> None:
     await bus.link.open()
     try:
@@ -194,6 +195,7 @@ async def test_a_mapping_that_can_only_be_read_is_reported_and_left_assigned(bus
         await bus.link.close()
 
 
+@pytest.mark.long
 async def test_a_drive_with_another_complete_access_and_no_divider_is_taken_to_op(bus: Bus) -> None:
     """So an independent slave stack is: no complete access of SOEM's kind, 0400h at 0."""
     await bus.link.open()

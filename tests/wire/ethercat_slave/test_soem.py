@@ -137,6 +137,7 @@ def test_what_strangers_do_with_pysoem(namespace: Namespace) -> None:
     assert got["init"] == 1
 
 
+@pytest.mark.long
 def test_soems_own_way_of_loading_firmware(namespace: Namespace) -> None:
     drives = ["--drive", "firmware", "--factory", FACTORY]
     with VirtualSegment.start(SLAVE, drives, namespace) as running:
@@ -222,6 +223,7 @@ def test_trouble_on_the_wire_as_the_master_sees_it(
         assert master.cycles(10)[0][-1] == 6
 
 
+@pytest.mark.long
 def test_one_segment_per_interface(namespace: Namespace, shared: VirtualSegment) -> None:
     with pytest.raises(LinkLost, match="already answers on ec1s"):
         segment(namespace, 1, interface=SHARED_SLAVE)

@@ -18,6 +18,7 @@ LARGE = [
 ]
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize(("path", "body"), LARGE, ids=lambda part: part if "/" in part else "")
 async def test_a_route_of_files_refuses_it(
     tmp_path: Path, path: str, body: dict[str, object]

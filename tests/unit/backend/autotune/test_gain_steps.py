@@ -120,7 +120,7 @@ def test_the_simulated_loop_has_the_margin_that_is_computed() -> None:
     assert last(10.3) > 30.0
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("noise", [0.0, 0.7])
 @pytest.mark.parametrize("left_db", [2.0, 4.0])
 @pytest.mark.parametrize("swing_hz", [14.0, 60.0])
@@ -132,7 +132,7 @@ def test_a_loop_that_has_margin_left_is_stable(
     assert seen_stable(loop, 9.0) == 1.0
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("noise", [0.0, 0.3])
 @pytest.mark.parametrize("beyond_db", [0.3, 2.0])
 @pytest.mark.parametrize("delay", [6, 12, 20])

@@ -173,7 +173,7 @@ def test_widths_become_what_was_measured() -> None:
     assert seen[1] == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.long(keep=2)
+@pytest.mark.long
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 @pytest.mark.parametrize(
     "truth", [Notch(120.0, 60.0, -40.0), Notch(122.0, 6.0, -9.0), Notch(118.0, 240.0, -3.0)]

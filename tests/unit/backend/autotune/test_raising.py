@@ -122,6 +122,7 @@ def test_a_path_that_a_raised_gain_contradicts_is_left_out() -> None:
     assert worst_of_paths(all_of_them).contradicted
 
 
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize("late_s", [100e-6, 250e-6, 400e-6])
 def test_a_loop_that_is_late_is_not_kept_unless_it_is_sound(late_s: float) -> None:
     for hz in (5.0, 7.0, 10.0):

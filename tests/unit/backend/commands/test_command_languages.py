@@ -31,7 +31,7 @@ def test_version() -> None:
     assert servodeck("--version").stdout == f"servodeck {__version__}\n"
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "environment"),
     [(("--language", "zh"), {}), ((), {"LANG": "zh_CN.UTF-8"}), ((), {"LC_ALL": "zh_TW"})],
@@ -44,6 +44,7 @@ def test_errors_are_in_chinese(arguments: tuple[str, ...], environment: dict[str
     assert "write it like" not in done.stderr
 
 
+@pytest.mark.long
 def test_option_wins_over_the_locale() -> None:
     done = servodeck("--language", "en", "scan", "nobus://", LANG="zh_CN.UTF-8")
     assert done.stderr.startswith("error: 'nobus://' is not a bus URL")

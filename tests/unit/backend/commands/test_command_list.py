@@ -37,6 +37,7 @@ def test_the_list_of_commands_imports_none_of_them() -> None:
     assert not any(name.startswith("backend.commands.") for name in there)
 
 
+@pytest.mark.long
 def test_scanning_and_moving_import_neither_server_nor_analysis() -> None:
     there = imported_by("import backend.commands.buses.scan, backend.commands.drive.live")
     assert not there & set(HEAVY)

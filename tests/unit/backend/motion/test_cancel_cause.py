@@ -105,7 +105,7 @@ CAUSES: list[tuple[Ending, str, str, str]] = [
 ]
 
 
-@pytest.mark.long(keep=4)
+@pytest.mark.long(keep=3)
 @pytest.mark.parametrize(("end", "code", "english", "chinese"), CAUSES)
 async def test_every_way_to_cancel_a_motion_states_its_cause_and_a_remedy(
     bench: Bench, hub: LiveHub, end: Ending, code: str, english: str, chinese: str

@@ -597,6 +597,7 @@ async def test_a_measurement_is_answered_although_its_exchange_is_never_set_up(
     bench.exchanges.require_calm("X", [URL])
 
 
+@pytest.mark.long
 async def test_a_measurement_does_not_begin_when_stop_was_pressed_as_its_exchange_was_set_up(
     bench: Bench, x: ConnectedDrive, http: httpx.AsyncClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

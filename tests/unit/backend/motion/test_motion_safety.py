@@ -65,6 +65,7 @@ async def test_stop_is_sent_even_when_its_asker_is_gone(
     await eventually(lambda: servo.words() == [2])
 
 
+@pytest.mark.long
 async def test_a_command_begun_before_stop_never_enables_even_after_a_new_one(
     bench: Bench, servo: Servo, http: httpx.AsyncClient
 ) -> None:

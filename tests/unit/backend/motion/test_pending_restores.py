@@ -199,6 +199,7 @@ async def test_stop_stands_until_a_person_takes_it_back(
     assert x.axis.stopped
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("how", ["enabled", "moving", "held by a job"])
 async def test_an_axis_that_does_not_stand_free_is_left_alone(
     bench: Bench, x: ConnectedDrive, servo: Servo, how: str

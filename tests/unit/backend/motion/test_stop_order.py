@@ -160,6 +160,7 @@ async def test_a_motion_whose_request_was_on_its_way_when_stop_was_pressed_does_
     assert servo.words() == []
 
 
+@pytest.mark.long
 async def test_a_motion_that_is_asked_for_after_stop_begins(
     bench: Bench, servo: Servo, http: httpx.AsyncClient
 ) -> None:

@@ -127,6 +127,7 @@ async def _named(folder: Path) -> dict[str, set[str]]:
     return found
 
 
+@pytest.mark.long
 async def test_a_name_that_is_not_one_of_ours_hides_nothing(folder: Path) -> None:
     for kind, suffix in KINDS.items():
         place = folder / kind

@@ -42,7 +42,7 @@ async def test_a_process_that_ends_without_an_answer_is_reported() -> None:
         await read_apart(SMALL_BYTES + 1, os._exit, 1)
 
 
-@pytest.mark.long(keep=11)
+@pytest.mark.long(keep=10)
 @pytest.mark.parametrize("cancellations", [0, 1, 3])
 @pytest.mark.parametrize("after_s", [0.0, 0.002, 0.02, 0.3])
 def test_a_cancelled_reading_leaves_no_process_and_no_pipe(

@@ -140,7 +140,7 @@ def test_values_are_shown_as_the_manual_means_them(drive: Drive) -> None:
 # --- what is concluded -----------------------------------------------------------------
 
 
-@pytest.mark.long(keep=5)
+@pytest.mark.long(keep=2)
 @pytest.mark.parametrize(
     ("margins", "tone", "word"),
     [
@@ -345,6 +345,7 @@ def test_html_tells_everything(facts: Facts) -> None:
 # --- PDF -------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_pdf_can_be_read_back(facts: Facts) -> None:
     data = render_pdf(compose(facts, "en"))
     reader = PdfReader(io.BytesIO(data))

@@ -252,6 +252,7 @@ def test_what_is_no_recording_is_refused_by_name(data: bytes, said: str) -> None
     assert error.value.remedy
 
 
+@pytest.mark.long
 def test_a_gzip_bomb_is_refused_before_it_is_unpacked() -> None:
     bomb = gzip.compress(b"0,0,0\n" * (MAX_UNPACKED_BYTES // 6 + 10), 1)
     assert len(bomb) < MAX_UNPACKED_BYTES // 50

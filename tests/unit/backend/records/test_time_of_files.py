@@ -40,7 +40,7 @@ def parameter_set(data: bytes) -> object:
     return parse(data, "list")
 
 
-@pytest.mark.long(keep=11)
+@pytest.mark.long(keep=4)
 @pytest.mark.parametrize(
     ("read", "data"),
     [

@@ -52,7 +52,7 @@ def found(recording: Recording) -> InertiaResult:
     return evaluate(recording, SETTINGS, FACTS)
 
 
-@pytest.mark.long(keep=3)
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("offset", [False, True])
 @pytest.mark.parametrize("loop_1_s", [15.0, 60.0])
 def test_the_gain_of_the_loop_is_seen_whatever_the_units(loop_1_s: float, offset: bool) -> None:
@@ -61,6 +61,7 @@ def test_the_gain_of_the_loop_is_seen_whatever_the_units(loop_1_s: float, offset
         assert gain == pytest.approx(loop_1_s * J, rel=0.1)
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("loop_1_s", [15.0, 60.0])
 def test_setpoints_that_are_held_bend_the_inertia_within_its_interval(loop_1_s: float) -> None:
     result = found(moved(loop_1_s, held=True))
@@ -71,6 +72,7 @@ def test_setpoints_that_are_held_bend_the_inertia_within_its_interval(loop_1_s: 
     assert inertia.low <= J <= inertia.high
 
 
+@pytest.mark.long(keep=1)
 @pytest.mark.parametrize("loop_1_s", [15.0, 60.0])
 def test_interpolated_setpoints_leave_the_interval_narrow(loop_1_s: float) -> None:
     inertia = found(moved(loop_1_s, held=False)).inertia_kgm2
