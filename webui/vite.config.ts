@@ -43,6 +43,7 @@ export default defineConfig({
   test: {
     environment: 'node',
     include: ['src/**/*.test.{ts,tsx}'],
+    pool: 'threads', // a quarter faster than processes
     testTimeout: 60_000, // some show whole pages, also on a busy machine
   },
 })
