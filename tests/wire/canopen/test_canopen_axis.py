@@ -69,7 +69,6 @@ async def test_jog_by_short_moves(axis: Axis) -> None:
     assert await axis.state() is not State.OPERATION_ENABLED
 
 
-@pytest.mark.long
 async def test_jog_with_process_data(axis: Axis) -> None:
     session = CyclicSession(axis.drive.ports[0].link, [axis.drive])
     axis.session = session
