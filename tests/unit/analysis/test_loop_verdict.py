@@ -15,7 +15,7 @@ from backend.analysis.response.signal_path.reference_path import reference_paths
 from backend.analysis.response.signal_path.sampling import hold_response
 
 DENSE = np.geomspace(1.0, 6000.0, 3000)
-PROMISED = Goals(9.0, 48.0, 1.8)
+GUARANTEED = Goals(9.0, 48.0, 1.8)
 
 
 def loop_of(f: np.ndarray, crossover_hz: float, delay_s: float) -> np.ndarray:
@@ -100,7 +100,7 @@ def test_a_crossover_above_the_band_keeps_no_design() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0)
     assert found.coverage == "predicted"
     assert found.last_crossover_hz == pytest.approx(474.0, rel=0.1)
-    assert [m.what for m in found.missed(PROMISED, 1.0, 1.0, 1.03)] == ["coverage"]
+    assert [m.what for m in found.missed(GUARANTEED, 1.0, 1.0, 1.03)] == ["coverage"]
 
 
 def test_a_crossover_below_the_band_is_not_measured() -> None:
@@ -185,7 +185,7 @@ def test_a_crossover_that_is_predicted_below_lines_that_do_not_show_it_counts() 
 def test_a_raised_gain_covers_it() -> None:
     found = verdict_of(474.0, 0.1e-3, 246.0, shown_db=6.5)
     assert found.coverage == "gain_steps"
-    assert not found.missed(PROMISED, 1.0, 1.0, 1.03)
+    assert not found.missed(GUARANTEED, 1.0, 1.0, 1.03)
 
 
 def test_a_delay_that_lines_show_counts_beyond_them() -> None:
@@ -196,7 +196,7 @@ def test_a_delay_that_lines_show_counts_beyond_them() -> None:
     true_deg = 90 - 360 * 474 * 0.35e-3
     assert found.predicted.phase_margin_deg.value == pytest.approx(true_deg, abs=1.5)
     assert found.predicted.phase_margin_deg.low < true_deg
-    assert "phase_margin" in [m.what for m in found.missed(PROMISED, 1.0, 1.0, 1.03)]
+    assert "phase_margin" in [m.what for m in found.missed(GUARANTEED, 1.0, 1.0, 1.03)]
 
 
 def test_the_worst_end_of_an_interval_counts_as_well() -> None:
@@ -330,10 +330,10 @@ def test_a_raised_gain_keeps_only_loops_that_no_line_told_but_are_sound() -> Non
         true_db, true_deg, true_ms = delayed(crossover, late, factor)
         nominal = loop_of(DENSE, crossover, 0.5e-3)
         before = judge(None, DENSE, nominal[None, :], nominal)
-        wanted = max(8.0, excluding_db(before, DENSE, nominal[None, :], PROMISED) + 0.2)
+        wanted = max(8.0, excluding_db(before, DENSE, nominal[None, :], GUARANTEED) + 0.2)
         shown = min(wanted, true_db)
         found = judge(None, DENSE, nominal[None, :], nominal, shown_gain_db=shown)
-        missed = found.missed(PROMISED, 1.0, 1.0, 1.03) or shown < 7.0
+        missed = found.missed(GUARANTEED, 1.0, 1.0, 1.03) or shown < 7.0
         meets = true_db >= 9.0 and true_deg >= 48.0 and true_ms <= 1.8
         holds = true_db >= 7.8 and true_deg >= 42.5 and true_ms <= 1.8 * 10 ** (1.2 / 20)
         unsound += not holds
@@ -381,7 +381,7 @@ def uncertain(shown_gain_db: float | None, late_std_s: float = 150e-6) -> LoopVe
 def test_a_possible_loop_that_is_not_stable_is_excluded_by_a_raised_gain() -> None:
     before = uncertain(None, 600e-6)
     assert not before.stable
-    missed = before.missed(PROMISED, 1.0, 1.0, 1.03)
+    missed = before.missed(GUARANTEED, 1.0, 1.0, 1.03)
     assert {(m.what, m.end) for m in missed if m.what != "coverage"} == {
         ("stability", "predicted"),
         ("phase_margin", "predicted"),
@@ -391,12 +391,12 @@ def test_a_possible_loop_that_is_not_stable_is_excluded_by_a_raised_gain() -> No
     # At 9.5 dB a loop of 150 Hz is late by 0.56 ms, and has 60° left.
     after = uncertain(9.5, 600e-6)
     assert after.stable
-    assert not after.missed(PROMISED, 1.0, 1.0, 1.03)
+    assert not after.missed(GUARANTEED, 1.0, 1.0, 1.03)
 
 
 def test_what_lines_show_is_not_left_to_a_raised_gain() -> None:
     found = verdict_of(60.0, 2.2e-3, 400.0)
-    assert {(m.what, m.end) for m in found.missed(PROMISED, 1.0, 1.0, 1.03)} >= {
+    assert {(m.what, m.end) for m in found.missed(GUARANTEED, 1.0, 1.0, 1.03)} >= {
         ("phase_margin", "stated")
     }
 
