@@ -11,6 +11,7 @@ import pytest
 from drivers.computer.timing.scheduling import VIRTUAL_PRIORITY
 from tests.support import long_suite
 from tests.support.hang import EndsWhatHangs
+from tests.support.small_heap import SmallHeap
 
 _ROOT = Path(__file__).resolve().parents[1]
 _homes = pytest.StashKey[tempfile.TemporaryDirectory[str]]()
@@ -27,6 +28,7 @@ def pytest_configure(config: pytest.Config) -> None:
     The cache is shared by all tests: it holds only what is made from the project's own files.
     """
     config.pluginmanager.register(EndsWhatHangs(), "ends-what-hangs")
+    config.pluginmanager.register(SmallHeap(), "small-heap")
     config.addinivalue_line("markers", long_suite.MARKER)
     config.pluginmanager.register(long_suite.LongSuite(config.getoption("--long")), "long-suite")
     home = tempfile.TemporaryDirectory(prefix="servodeck-tests-")

@@ -28,7 +28,7 @@ BIN = Path(sys.executable).parent
 #: Without a system npm, the one of a Python package (see hatch_build.py).
 NPM = ["npm"] if shutil.which("npm") else [sys.executable, str(ROOT / "hatch_build.py")]
 
-PYTEST = [sys.executable, "-m", "pytest", "-q", "-rs", "--durations=12"]
+PYTEST = [sys.executable, "-m", "pytest", "-q", "-rfEs", "--durations=12"]
 #: Suites with a bus in real time. Nothing runs next to them: a master that is kept from its cycle
 #: for 30 ms must brake the axis, and then the test does not see what it wants to see.
 REAL_TIME = [
