@@ -32,7 +32,7 @@ def quiet_line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.mark.long
 def test_the_rate_is_found_and_the_drive_connects(station: Station, quiet_line: Path) -> None:
-    url = f"modbus://{quiet_line}?timeout_ms=30"
+    url = f"modbus://{quiet_line}?timeout_ms=200"
     # Opened at a wrong rate before: the search closes a bus that nobody uses.
     wrong = station.done(station.http.post("/scan", json={"url": url, "stations": [1]}))
     assert wrong["found"] == []
