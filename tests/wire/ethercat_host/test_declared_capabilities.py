@@ -5,11 +5,13 @@ The unit of the Debian package is that of ``servodeck station unit``: see `tests
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -38,6 +40,49 @@ def of_container() -> list[str]:
     return [f"CAP_{name}" for name in re.findall(r"--cap-add (\w+)", text)]
 
 
+#: Of no way in: here, where the folders of checkout and interpreter are closed to others.
+READING = {"CAP_DAC_READ_SEARCH": 2}
+NOBODY = ["--reuid=65534", "--regid=65534", "--clear-groups"]
+#: Creates the cables in a network of its own but as the users of this computer: an ordinary user
+#: exists only there.
+HOLDER = """
+import sys
+from drivers.virtual.wires import netns
+netns.leave_namespaces = lambda: None
+sys.exit(netns._hold(sys.argv[1:]))
+"""
+
+
+def to_read_the_project() -> list[str]:
+    """What another user needs to read interpreter and checkout, where their folders are closed."""
+    # The first command of setpriv still has root's capabilities; its child has not.
+    command = ["setpriv", *NOBODY, "sh", "-c", f"{sys.executable} -c 'import backend'"]
+    tried = subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+    return [] if tried.returncode == 0 else list(READING)
+
+
+@pytest.fixture(scope="module")
+def users_network() -> Iterator[Namespace]:
+    """With a drive, and with this computer's users."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can start a program as another user")
+    holder = subprocess.Popen(
+        ["unshare", "--net", sys.executable, "-c", HOLDER, "ec0m", "ec0s"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=child_environment(),
+    )
+    assert holder.stdout is not None
+    answer = holder.stdout.readline().strip()
+    with Namespace(holder, (("ec0m", "ec0s"),)) as namespace:
+        assert answer == "ready", answer
+        arguments = ["--factory", FACTORY, "--lockstep", "--drive", "serial=7"]
+        segment = VirtualSegment.start("ec0s", arguments, namespace)
+        yield namespace
+        segment.close()
+
+
 @pytest.fixture(scope="module")
 def network() -> Iterator[Namespace]:
     with Namespace.create() as namespace:
@@ -47,11 +92,13 @@ def network() -> Iterator[Namespace]:
         segment.close()
 
 
-def limited(network: Namespace, names: list[str], *program: str) -> list[str]:
+def limited(
+    network: Namespace, names: list[str], *program: str, user: Sequence[str] = ()
+) -> list[str]:
     """A command line inside, with these capabilities alone; being root gives no others."""
     only = ",".join(["-all", *(f"+{name.removeprefix('CAP_').lower()}" for name in names)])
     return network.command(
-        ["setpriv", "--securebits", "+noroot,+noroot_locked", f"--inh-caps={only}",
+        ["setpriv", *user, "--securebits", "+noroot,+noroot_locked", f"--inh-caps={only}",
          f"--ambient-caps={only}", f"--bounding-set={only}", "--no-new-privs",
          sys.executable, "-m", "backend", *program]
     )  # fmt: skip
@@ -88,22 +135,41 @@ def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+def scan_by_server(
+    network: Namespace, names: list[str], *options: str, folder: Path, user: Sequence[str] = ()
+) -> str:
+    """Scan the bus by a server with these capabilities; return its ``/proc/PID/status``."""
+    serve = limited(network, names, "serve", "--port", "0", *options, user=user)
+    with station(serve, folder) as (process, address):
+        status = Path(f"/proc/{process}/status").read_text()
+        wanted = sum(1 << (NUMBERS | READING)[name] for name in names)
+        for kind in ("CapEff", "CapPrm", "CapBnd"):
+            assert f"{kind}:\t{wanted:016x}\n" in status
+        scan = [sys.executable, "-m", "backend", "scan", "ethercat://ec0m", "--server", address]
+        found = run(network.command(scan), folder)
+    assert found.returncode == 0, found.stdout + found.stderr
+    assert "station 1:" in found.stdout
+    return status
+
+
 @pytest.mark.long
 def test_the_station_scans_with_what_unit_and_container_declare(
     network: Namespace, tmp_path: Path
 ) -> None:
     names = of_unit()
     assert sorted(of_container()) == sorted(names)
-    serve = limited(network, names, "serve", "--port", "0", "--config", str(tmp_path / "state"))
-    with station(serve, tmp_path) as (process, address):
-        status = Path(f"/proc/{process}/status").read_text()
-        wanted = sum(1 << NUMBERS[name] for name in names)
-        for kind in ("CapEff", "CapPrm", "CapBnd"):
-            assert f"{kind}:\t{wanted:016x}\n" in status
-        scan = [sys.executable, "-m", "backend", "scan", "ethercat://ec0m", "--server", address]
-        found = run(network.command(scan), tmp_path)
-    assert found.returncode == 0, found.stdout + found.stderr
-    assert "station 1:" in found.stdout
+    scan_by_server(network, names, "--config", str(tmp_path / "state"), folder=tmp_path)
+
+
+def test_a_user_without_rights_scans_with_them(users_network: Namespace) -> None:
+    """As the unit's ``User=``, who owns nothing but the state folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.chown(folder, 65534, 65534)
+        names = [*of_unit(), *to_read_the_project()]
+        status = scan_by_server(
+            users_network, names, "--config", folder, folder=Path(folder), user=NOBODY
+        )
+        assert "Uid:\t65534\t65534\t65534\t65534\n" in status
 
 
 @pytest.mark.long(keep=1)
