@@ -135,7 +135,7 @@ def debian(walk: Walk, dist: Path) -> None:
     """dpkg in a root of its own; service, user and udev are not started there."""
     walk.page(
         "systemctl start servodeck (here: its program)",
-        _installed(walk, dist),
+        debian_program(walk, dist),
         "serve",
         "--port",
         "0",
@@ -143,7 +143,7 @@ def debian(walk: Walk, dist: Path) -> None:
     )
 
 
-def _installed(walk: Walk, dist: Path) -> Path:
+def debian_program(walk: Walk, dist: Path) -> Path:
     """The program of the Debian package, installed in a root of its own."""
     if shutil.which("dpkg") is None:
         raise NotHere("no dpkg on this computer")
@@ -218,7 +218,7 @@ def _image(walk: Walk, dist: Path, recipe: Recipe) -> Path:
 
 def edge_box(walk: Walk, dist: Path) -> None:
     """The Debian package, then by commands what a person types on the page."""
-    program, state = _installed(walk, dist), walk.scratch / "state"
+    program, state = debian_program(walk, dist), walk.scratch / "state"
     path = f"{Path(sys.base_prefix) / 'bin'}:/usr/bin:/bin"
     walk.do(
         "page: code, administrator, password (here: servodeck people add)",

@@ -1,4 +1,4 @@
-"""What the Containerfile declares. ``python -m benchmarks.container`` starts what it describes."""
+"""What the Containerfile declares; ``python -m benchmarks.station_rights`` starts it."""
 
 from __future__ import annotations
 

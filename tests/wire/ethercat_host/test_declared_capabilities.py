@@ -21,6 +21,7 @@ from backend.station.install.service import systemd_unit
 from drivers.virtual.wires.ethercat.launch import VirtualSegment
 from drivers.virtual.wires.netns import Namespace, child_environment, unavailable
 from tests.support.contained import NUMBERS
+from tests.support.limited import only_with
 from tests.wire.ethercat_host.conftest import FACTORY
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -95,13 +96,9 @@ def network() -> Iterator[Namespace]:
 def limited(
     network: Namespace, names: list[str], *program: str, user: Sequence[str] = ()
 ) -> list[str]:
-    """A command line inside, with these capabilities alone; being root gives no others."""
-    only = ",".join(["-all", *(f"+{name.removeprefix('CAP_').lower()}" for name in names)])
-    return network.command(
-        ["setpriv", *user, "--securebits", "+noroot,+noroot_locked", f"--inh-caps={only}",
-         f"--ambient-caps={only}", f"--bounding-set={only}", "--no-new-privs",
-         sys.executable, "-m", "backend", *program]
-    )  # fmt: skip
+    """A command line inside, with these capabilities alone."""
+    command = [sys.executable, "-m", "backend", *program]
+    return network.command(only_with(names, command, user))
 
 
 @contextmanager
