@@ -181,6 +181,7 @@ export const library = {
   'audit.change': ['Old → new (raw)', '旧值 → 新值（原始）'],
   'audit.outcome': ['Outcome', '结果'],
   'audit.ok': ['succeeded', '成功'],
+  'audit.empty': ['Nothing has been recorded yet.', '尚无记录。'],
   'audit.none': ['No entry matches.', '没有符合的记录。'],
   'audit.more': ['Older entries', '更早的记录'],
   'audit.refresh': ['Refresh', '刷新'],

@@ -50,7 +50,12 @@ export function AuditPage() {
         <p className="dim">{t('audit.help')}</p>
         <Choices filters={filters} names={names} onChange={setFilters} />
         <ProblemNote problem={problem} />
-        {events && <AuditTable events={events} />}
+        {events?.length === 0 && (
+          <p className="empty">
+            {t(Object.values(filters).some(Boolean) ? 'audit.none' : 'audit.empty')}
+          </p>
+        )}
+        {events && events.length > 0 && <AuditTable events={events} />}
         {older && (
           <div className="row end">
             <Button onClick={older}>{t('audit.more')}</Button>

@@ -7,7 +7,6 @@ import { dateTime } from '../../widgets/numbers/format'
 export function AuditTable({ events }: { events: AuditEvent[] }) {
   const t = useT()
   const say = useSay()
-  if (events.length === 0) return <p className="empty">{t('audit.none')}</p>
   return (
     <table className="audit-table">
       <thead>
