@@ -49,9 +49,13 @@ class SegmentRecorder:
             self._streams = await asyncio.open_connection(sock=ours)
             async with asyncio.timeout(_START_S):
                 await self._streams[0].readexactly(len(READY))
-        except (OSError, asyncio.IncompleteReadError):
-            ours.close()
-            await self.stop()
+        except BaseException as error:
+            # Also where the caller was cancelled: the process would record for nobody.
+            if self._streams is None:
+                ours.close()
+            await asyncio.shield(self.stop())
+            if not isinstance(error, (OSError, asyncio.IncompleteReadError)):
+                raise
 
     def note(self, text: str, station: int | None = None) -> None:
         """Add an annotation for the next frame."""
@@ -85,19 +89,22 @@ class SegmentRecorder:
 
     async def stop(self) -> None:
         """End the recorder. Further calls have no effect."""
-        if self._streams is not None:
-            self._streams[1].close()
-            self._streams = None
+        streams, self._streams = self._streams, None
+        if streams is not None:
+            streams[1].close()
         process, self._process = self._process, None
-        if process is None:
-            return
-        try:
-            async with asyncio.timeout(_END_S):
+        if process is not None:
+            try:
+                async with asyncio.timeout(_END_S):
+                    await process.wait()
+            except TimeoutError:
+                with contextlib.suppress(ProcessLookupError):
+                    process.kill()
                 await process.wait()
-        except TimeoutError:
-            with contextlib.suppress(ProcessLookupError):
-                process.kill()
-            await process.wait()
+        if streams is not None:
+            # Afterwards: what was not sent yet is discarded only when the other end is gone.
+            with contextlib.suppress(OSError):
+                await streams[1].wait_closed()
 
     def _gone(self) -> LinkLost:
         return LinkLost("link.frames-not-being-recorded", interface=self._interface)
