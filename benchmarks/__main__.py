@@ -3,7 +3,8 @@
     python -m benchmarks [NAME …]
 
 A benchmark is a module of this package with a ``main()`` that prints what it measured and the
-figure it aims at. They are no tests: a slow machine gives worse figures, not a failure.
+figure it aims at. They are no tests: a slow machine gives worse figures, not a failure. That each
+runs to its end is tested in its smallest form (`tests/benchmarks`).
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def main() -> int:
         argv, sys.argv = sys.argv, [name]
         try:
             module.main()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
+            # A benchmark that ends the program (bad arguments) must not end those after it.
             broken += 1
             print(f"broken: {type(error).__name__}: {error}")
         finally:

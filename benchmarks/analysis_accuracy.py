@@ -22,6 +22,7 @@ from measured_axes import NAMED, errors, measure  # noqa: E402
 
 from backend.analysis.mechanics.identification.identify import identify_mechanics  # noqa: E402
 
+RATES_HZ = (1000.0, 4000.0)
 LOOPS = ((0.0, False), (10.0, False), (40.0, False), (40.0, True), (80.0, False))
 
 
@@ -29,16 +30,10 @@ def main() -> None:
     only = sys.argv[1:] or list(NAMED)
     head = "axis       rate loop      band        dB    deg  cover  delay_us  motion_s  analysis_s"
     print(head)
-    for rate in (1000.0, 4000.0):
+    for rate in RATES_HZ:
         for name in only:
             mechanics = NAMED[name]
-            for loop_hz, position in (
-                (0.0, False),
-                (10, False),
-                (40, False),
-                (40, True),
-                (80, False),
-            ):
+            for loop_hz, position in LOOPS:
                 m = measure(mechanics, rate, loop_hz, position=position)
                 start = time.perf_counter()
                 found = identify_mechanics(m.records, m.path, m.quantity)

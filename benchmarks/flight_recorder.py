@@ -143,7 +143,8 @@ async def measure(
 
 
 async def _switch(link: EthercatLink, on: bool) -> None:
-    await (link.recorder.start() if on else link.recorder.stop())
+    if (link.recorder.process_id is not None) is not on:
+        await (link.recorder.start() if on else link.recorder.stop())
     if (link.recorder.process_id is not None) is not on:
         raise RuntimeError("the recorder did not start")
     await asyncio.sleep(_SETTLE_S)

@@ -111,6 +111,7 @@ def station_process(folder: Path) -> Iterator[tuple[httpx.Client, int, str]]:
     finally:
         child.stdin.close()
         child.wait(30)
+        child.stdout.close()
 
 
 class Poller(threading.Thread):

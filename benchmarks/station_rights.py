@@ -1,6 +1,6 @@
 """An EtherCAT station from the files of ``make packages``, with the capabilities declared there.
 
-    python -m benchmarks.station_rights
+    python -m benchmarks.station_rights [DIST]
 
 The container's root is laid out as the Containerfile says and its program started in namespaces, as
 `tests.support.contained` does. The Debian package is installed in a root of its own and its program
@@ -32,6 +32,10 @@ _UNIT = "usr/lib/systemd/system/servodeck.service"
 
 def main() -> None:
     """Print what each station had and found."""
+    dist = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else DIST
+    if not (dist / "wheels").is_dir():
+        print("not possible here: no dist/wheels: make packages")
+        return
     aims: list[Aim] = []
     with (
         tempfile.TemporaryDirectory(prefix="servodeck-rights-") as place,
@@ -41,7 +45,7 @@ def main() -> None:
             "ec0s", ["--factory", _FACTORY, "--lockstep", "--drive", "serial=7"], network
         )
         try:
-            for name, declared, serve in _stations(Path(place)):
+            for name, declared, serve in _stations(Path(place), dist):
                 held, found = _scan(serve, network)
                 print(f"{name}: {found}")
                 wanted = sum(1 << NUMBERS[capability] for capability in declared)
@@ -53,19 +57,19 @@ def main() -> None:
     print_verdict(aims)
 
 
-def _stations(place: Path) -> Iterator[tuple[str, Sequence[str], list[str]]]:
+def _stations(place: Path, dist: Path) -> Iterator[tuple[str, Sequence[str], list[str]]]:
     """Name, declared capabilities and command line of each way whose files are here."""
     state = place / "state"
     state.mkdir()
     recipe = Recipe.read((ROOT / ".ci/supply/Containerfile").read_text("utf-8"))
-    recipe.unpack(ROOT, place / "container")
+    recipe.unpack(dist.parent, place / "container")
     serve = recipe.started(place / "container", state, "serve", "--port", "0")
     yield "container", recipe.capabilities, serve
     if shutil.which("dpkg") is None:
         print("Debian package: no dpkg on this computer")
         return
     walk = Walk(place, offline=False)
-    program = debian_program(walk, DIST)
+    program = debian_program(walk, dist)
     unit = (walk.scratch / "root" / _UNIT).read_text("utf-8")
     (declared,) = re.findall(r"^CapabilityBoundingSet=(.*)$", unit, re.MULTILINE)
     command = [str(program), "serve", "--port", "0", "--config", str(place / "debian-state")]

@@ -34,10 +34,12 @@ class SegmentRecorder:
         return None if self._process is None else self._process.pid
 
     async def start(self) -> None:
-        """Start recording before any further frame.
+        """Start recording before any further frame. Without effect while a process records.
 
         If the process cannot be started, nothing is recorded.
         """
+        if self._process is not None:
+            return
         ours, theirs = socket.socketpair()
         try:
             with theirs:
