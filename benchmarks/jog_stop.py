@@ -46,7 +46,8 @@ def jog_once(page: Live, x: str, direction: int) -> tuple[float, list[bytes]]:
 
 def main() -> None:
     """Print the figures."""
-    station = Station(Path(tempfile.mkdtemp()))
+    folder = tempfile.TemporaryDirectory()
+    station = Station(Path(folder.name))
     station.start()
     try:
         x = station.add(1, name="X")
@@ -74,6 +75,7 @@ def main() -> None:
         )
     finally:
         station.stop()
+        folder.cleanup()
 
 
 if __name__ == "__main__":

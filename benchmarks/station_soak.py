@@ -97,7 +97,8 @@ def watch(page: Live, axis: str) -> tuple[int, int, int]:
 
 def main() -> None:
     """Print the figures."""
-    folder = Path(tempfile.mkdtemp())
+    place = tempfile.TemporaryDirectory()
+    folder = Path(place.name)
     station = Station(
         folder, bench_file(folder), ["--realtime", "20"] if REAL_TIME else ["--steady"]
     )
@@ -146,6 +147,7 @@ def main() -> None:
         )
     finally:
         station.stop()
+        place.cleanup()
 
 
 if __name__ == "__main__":
