@@ -4,9 +4,9 @@ import { known, problemTitle, useSay, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/numbers/format'
-import { Icon } from '../widgets/Icon'
+import { Icon } from '../widgets/layout/Icon'
 import { PendingRestoresNote } from '../widgets/parameters/PendingRestoresNote'
-import { StateName } from '../widgets/StateName'
+import { StateName } from '../widgets/drive/StateName'
 import {
   AXIS_PAGES,
   BENCH_PAGES,

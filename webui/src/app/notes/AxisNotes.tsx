@@ -2,7 +2,7 @@ import { useRef } from 'react'
 import type { AxisState } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { useAxisState } from '../../live/store'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { href, type Page } from '../router'
 import { listsFaults } from '../states'
 

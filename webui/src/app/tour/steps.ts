@@ -1,5 +1,5 @@
 import type { AxisState, JobInfo } from '../../api/schema'
-import { keep, kept } from '../../widgets/kept'
+import { keep, kept } from '../../widgets/browser/kept'
 import type { AxisPage } from '../router'
 
 /** The steps of the guided tour, in order. */

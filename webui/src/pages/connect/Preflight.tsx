@@ -6,9 +6,9 @@ import { type T, useLanguage, useT } from '../../i18n'
 import { setJob } from '../../live/store'
 import { clock } from '../../widgets/numbers/format'
 import { JobNote, useJobEnd } from '../../widgets/jobs/JobNote'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 import { interfaceOf } from './preflight'
 
 type Fix = NonNullable<PreflightFinding['fix']>

@@ -4,9 +4,9 @@ import { api, ask } from '../../api/client'
 import type { BoxInfo } from '../../api/schema'
 import { hasRight, useSession } from '../../app/people/session'
 import { type T, useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 
 type Port = BoxInfo['ports'][number]
 

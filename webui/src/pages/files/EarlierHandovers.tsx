@@ -4,8 +4,8 @@ import { api, ask } from '../../api/client'
 import type { DriveSummary, HandedOverInfo, HandoverChanges } from '../../api/schema'
 import { useT } from '../../i18n'
 import { dateTime } from '../../widgets/numbers/format'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 import { ConflictTable } from './ConflictTable'
 
 /** What was handed over before; the drive is read again to say what has changed since. */

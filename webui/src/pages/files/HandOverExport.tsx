@@ -9,8 +9,8 @@ import type {
   SegmentAxis,
 } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 import { SegmentAxes } from './SegmentAxes'
 import { offerDownload } from './sets'
 

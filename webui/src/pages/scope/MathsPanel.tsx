@@ -2,7 +2,7 @@ import { ActionIcon, Button, TextInput } from '@mantine/core'
 import type { ScopeMath, ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
 import { FUNCTIONS } from '../../live/scope/expression'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { freeId, GREATEST_MATHS, mathProblem } from './setup'
 
 /** Computed channels: their names, units and texts. */

@@ -3,7 +3,7 @@ import { ExpressionError, parse } from '../../live/scope/expression'
 import type { TriggerSettings } from '../../live/scope/trigger'
 import type { ScopeConfig, ScopeSource, ScopeTrigger } from '../../live/worker-messages'
 import { type Span, sound } from '../../plots/yscale'
-import { keep, kept } from '../../widgets/kept'
+import { keep, kept } from '../../widgets/browser/kept'
 import { STATUS_WORD, VELOCITY_ACTUAL } from '../../widgets/parameters/objects'
 import type { Channel } from './channels'
 

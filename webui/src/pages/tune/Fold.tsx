@@ -1,6 +1,6 @@
 import { type ReactNode, useState } from 'react'
 import { useT } from '../../i18n'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import type { Section, useSections } from './sections'
 
 /**

@@ -1,6 +1,6 @@
 import { href } from '../../app/router'
 import { useT } from '../../i18n'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { type Known, nextStep, type StepName, STEPS, stepsDone } from './path'
 
 /** The guided path: what is done, what comes next, and the way to each step. */

@@ -4,13 +4,13 @@ import { API_ROOT, api, ask, problemOf } from '../../api/client'
 import type { Problem, ReportInfo, ReportRequest } from '../../api/schema'
 import { useLanguage, useT } from '../../i18n'
 import { useDrive } from '../../live/store'
-import { ConfirmDelete } from '../../widgets/ConfirmDelete'
+import { ConfirmDelete } from '../../widgets/messages/ConfirmDelete'
 import { dateTime } from '../../widgets/numbers/format'
-import { Icon } from '../../widgets/Icon'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { Icon } from '../../widgets/layout/Icon'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { ProcedureButton } from '../../widgets/faults/Procedures'
-import { useAction } from '../../widgets/useAction'
+import { useAction } from '../../widgets/requests/useAction'
 
 const FORMATS = ['pdf', 'html'] as const
 const LANGUAGES = ['en', 'zh'] as const

@@ -1,15 +1,15 @@
 // @vitest-environment happy-dom
-import '../testing/page'
+import '../../testing/page'
 import { act, renderHook } from '@testing-library/react'
 import { expect, it, vi } from 'vitest'
-import { currentSession, keep as keepSession, mayHaveStop } from '../app/people/session'
-import { storedPlace, storePlace } from '../app/tour/steps'
-import type { Session } from '../api/schema'
-import { setLanguage } from '../i18n'
-import { subscribe } from '../live/store'
-import { useRemembered } from '../pages/motion/remembered'
-import { EMPTY, storedSetup, storeSetup } from '../pages/scope/setup'
-import { setOriginal } from './profile-text/texts'
+import { currentSession, keep as keepSession, mayHaveStop } from '../../app/people/session'
+import { storedPlace, storePlace } from '../../app/tour/steps'
+import type { Session } from '../../api/schema'
+import { setLanguage } from '../../i18n'
+import { subscribe } from '../../live/store'
+import { useRemembered } from './remembered'
+import { EMPTY, storedSetup, storeSetup } from '../../pages/scope/setup'
+import { setOriginal } from '../profile-text/texts'
 
 const refuse = () => {
   throw new DOMException('refused', 'SecurityError')

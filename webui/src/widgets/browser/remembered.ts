@@ -1,5 +1,5 @@
 import { useEffect, useState } from 'react'
-import { keep, kept } from '../../widgets/kept'
+import { keep, kept } from './kept'
 
 /** A number kept in this browser for one drive. `start` undefined: not known yet. */
 export function useRemembered(

@@ -1,6 +1,6 @@
 import { useEffect, useState } from 'react'
-import { problemOf } from '../api/client'
-import type { Problem } from '../api/schema'
+import { problemOf } from '../../api/client'
+import type { Problem } from '../../api/schema'
 
 /**
  * What the server says to something that is being typed: asked `settleMs` after the last change,

@@ -1,6 +1,6 @@
 import { useCallback, useState } from 'react'
-import { problemOf } from '../api/client'
-import type { Problem } from '../api/schema'
+import { problemOf } from '../../api/client'
+import type { Problem } from '../../api/schema'
 
 /** Runs one request at a time and keeps its problem until the next one. */
 export function useAction() {

@@ -1,4 +1,4 @@
-import { stopEverything } from '../app/stop/stop'
+import { stopEverything } from './stop'
 
 /** Keys pressed in a frame do not come to the page; Esc must stop from there too. */
 export function stopByEscapeIn(frame: HTMLIFrameElement | null): void {

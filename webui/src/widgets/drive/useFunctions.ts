@@ -1,7 +1,7 @@
 import { useCallback, useEffect, useState } from 'react'
-import { api, ask, problemOf } from '../api/client'
-import type { AxisRecordInfo, Functions, Problem } from '../api/schema'
-import { publish, useLink, useStore, whenGone } from '../live/store'
+import { api, ask, problemOf } from '../../api/client'
+import type { AxisRecordInfo, Functions, Problem } from '../../api/schema'
+import { publish, useLink, useStore, whenGone } from '../../live/store'
 
 const known = new Map<string, Functions>()
 

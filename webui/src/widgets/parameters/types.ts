@@ -1,4 +1,4 @@
-import type { ParameterRow } from '../api/schema'
+import type { ParameterRow } from '../../api/schema'
 
 export type Raw = number | string
 /** Description part of a row. */

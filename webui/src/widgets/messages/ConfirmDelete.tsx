@@ -1,7 +1,7 @@
 import { Button, Modal } from '@mantine/core'
 import type { ReactNode } from 'react'
-import type { Problem } from '../api/schema'
-import { useT } from '../i18n'
+import type { Problem } from '../../api/schema'
+import { useT } from '../../i18n'
 import { ProblemNote } from './ProblemNote'
 
 /** Asks before something goes; `action` is the word on the button that does it. */

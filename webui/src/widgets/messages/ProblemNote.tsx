@@ -1,7 +1,7 @@
-import { UNREACHABLE } from '../api/client'
-import type { Problem } from '../api/schema'
-import { problemTitle, useSay, useT } from '../i18n'
-import { FORGOTTEN } from '../live/store'
+import { UNREACHABLE } from '../../api/client'
+import type { Problem } from '../../api/schema'
+import { problemTitle, useSay, useT } from '../../i18n'
+import { FORGOTTEN } from '../../live/store'
 
 /** What happened, to which drive and parameter, the limit, and what to try. */
 export function ProblemNote({

@@ -1,4 +1,4 @@
-import { known, useLanguage, useT } from '../i18n'
+import { known, useLanguage, useT } from '../../i18n'
 
 /**
  * A power state of CiA 402 in the page's language. The manuals print the states in English: a

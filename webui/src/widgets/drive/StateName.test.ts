@@ -1,12 +1,12 @@
 import { createElement } from 'react'
 import { renderToStaticMarkup } from 'react-dom/server'
 import { describe, expect, it, vi } from 'vitest'
-import { type Key, type Language, translate } from '../i18n'
+import { type Key, type Language, translate } from '../../i18n'
 import { StateName } from './StateName'
 
 let language: Language = 'en'
-vi.mock('../i18n', async (original) => ({
-  ...(await original<typeof import('../i18n')>()),
+vi.mock('../../i18n', async (original) => ({
+  ...(await original<typeof import('../../i18n')>()),
   useLanguage: () => language,
   useT: () => (key: Key) => translate(language, key),
 }))

@@ -1,6 +1,6 @@
 import { Button } from '@mantine/core'
-import type { Problem } from '../api/schema'
-import { useT } from '../i18n'
+import type { Problem } from '../../api/schema'
+import { useT } from '../../i18n'
 import { ProblemNote } from './ProblemNote'
 
 const CHANGED = 'urn:servodeck:changed-meanwhile'
