@@ -15,7 +15,7 @@ import {
   isAxisPage,
   type Page,
   useRoute,
-} from './router'
+} from './navigation/router'
 import { FaultElsewhere } from './notes/FaultElsewhere'
 import { AxisNotes } from './notes/AxisNotes'
 import { Late } from './notes/Late'
@@ -29,9 +29,9 @@ import { StopElsewhere } from './stop/StopElsewhere'
 import { SupportBar } from './people/SupportBar'
 import { Tour } from './tour/Tour'
 import { TurningNote } from './notes/TurningNote'
-import { linkLook, stateLook } from './states'
-import { useCanTune } from './useCanTune'
-import { useHasIo } from './useHasIo'
+import { linkLook, stateLook } from './navigation/states'
+import { useCanTune } from './navigation/useCanTune'
+import { useHasIo } from './navigation/useHasIo'
 
 /** What a thumb reaches on a phone: with an axis, and before there is one. */
 const HANDY = ['overview', 'parameters', 'motion', 'scope', 'alarms'] as const

@@ -1,7 +1,7 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
 import type { LibraryEntry } from '../../api/schema'
-import { useRoute } from '../../app/router'
+import { useRoute } from '../../app/navigation/router'
 import { useT } from '../../i18n'
 import { useDrive, useDrives } from '../../live/store'
 import { Panel } from '../../widgets/layout/Panel'

@@ -1,5 +1,5 @@
 import { useEffect, useState } from 'react'
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import { useDrive, useLink } from '../../live/store'

@@ -1,6 +1,6 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { useHasTour } from '../../app/tour/tour'
 import { useT } from '../../i18n'
 import { useLink } from '../../live/store'

@@ -1,7 +1,7 @@
 import { SegmentedControl } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
-import { useRoute } from '../../app/router'
+import { useRoute } from '../../app/navigation/router'
 import { useT } from '../../i18n'
 import { loadRows } from '../../live/live'
 import { contents, setJob, useDrive, useLink } from '../../live/store'

@@ -1,4 +1,4 @@
-import { stateLook, stateSign } from '../../app/states'
+import { stateLook, stateSign } from '../../app/navigation/states'
 import { useT } from '../../i18n'
 import { useAxisStates, useDrives } from '../../live/store'
 import { StateName } from '../../widgets/drive/StateName'

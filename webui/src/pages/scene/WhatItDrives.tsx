@@ -1,7 +1,7 @@
 import { Button, NativeSelect } from '@mantine/core'
 import { useEffect, useState } from 'react'
 import type { DriveSummary } from '../../api/schema'
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { useT } from '../../i18n'
 import { HOME_OFFSET, SOFTWARE_LIMITS } from '../../widgets/parameters/objects'
 import { ParameterFields, useReachable } from '../../widgets/parameters/ParameterFields'

@@ -1,6 +1,6 @@
 import { SegmentedControl, useComputedColorScheme } from '@mantine/core'
 import { useCallback, useEffect, useRef, useState } from 'react'
-import { useRoute } from '../../app/router'
+import { useRoute } from '../../app/navigation/router'
 import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'

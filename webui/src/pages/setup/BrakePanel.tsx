@@ -1,5 +1,5 @@
 import '../../widgets/layout/functions.css'
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import type { BrakeTiming, IoInfo } from '../../api/schema'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'

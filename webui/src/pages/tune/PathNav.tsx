@@ -1,4 +1,4 @@
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { useT } from '../../i18n'
 import { Icon } from '../../widgets/layout/Icon'
 import { type Known, nextStep, type StepName, STEPS, stepsDone } from './path'

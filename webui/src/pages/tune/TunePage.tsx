@@ -1,4 +1,4 @@
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { useSay, useT } from '../../i18n'
 import type { DriveSummary } from '../../api/schema'
 import { useAxisState, useDrive, useLink } from '../../live/store'

@@ -1,7 +1,7 @@
 import { useEffect } from 'react'
-import { askBuses, useCyclicUrl } from '../live/buses'
-import { useAxisState, useDrive, useLink } from '../live/store'
-import { measurable } from '../pages/response/measure/measurable'
+import { askBuses, useCyclicUrl } from '../../live/buses'
+import { useAxisState, useDrive, useLink } from '../../live/store'
+import { measurable } from '../../pages/response/measure/measurable'
 
 /** Whether an axis can be measured over a bus that it is connected to. */
 export function useCanTune(drive: string | null): boolean {

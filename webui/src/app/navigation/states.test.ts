@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import type { AxisState, Quality } from '../api/schema'
+import type { AxisState, Quality } from '../../api/schema'
 import { listsFaults, linkLook, stateSign } from './states'
 
 const quality = (part: Partial<Quality>): Quality => ({

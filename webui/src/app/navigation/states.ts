@@ -1,5 +1,5 @@
-import type { AxisState, Quality } from '../api/schema'
-import type { IconName } from '../widgets/layout/Icon'
+import type { AxisState, Quality } from '../../api/schema'
+import type { IconName } from '../../widgets/layout/Icon'
 import type { Page } from './router'
 
 /** How an axis state looks: a colour class and an icon; the words are always next to them. */

@@ -1,5 +1,5 @@
-import { useOriginalRows } from '../live/store'
-import { DIGITAL_INPUTS, DIGITAL_OUTPUTS } from '../widgets/parameters/objects'
+import { useOriginalRows } from '../../live/store'
+import { DIGITAL_INPUTS, DIGITAL_OUTPUTS } from '../../widgets/parameters/objects'
 
 /** Whether the drive has objects that the I/O page can show. */
 export function useHasIo(drive: string | null): boolean {

@@ -2,7 +2,7 @@ import { readdirSync, readFileSync } from 'node:fs'
 import { join } from 'node:path'
 import { expect, it } from 'vitest'
 
-const SOURCE = new URL('..', import.meta.url).pathname
+const SOURCE = new URL('../..', import.meta.url).pathname
 
 function sheets(folder: string): string[] {
   return readdirSync(folder, { withFileTypes: true }).flatMap((entry) =>
