@@ -14,8 +14,8 @@ import type {
   StopResult,
 } from '../api/schema'
 import { serverNow } from './server-clock'
-import type { LinkState } from './socket'
-import type { TriggerState } from './worker-messages'
+import type { LinkState } from './worker/socket'
+import type { TriggerState } from './worker/worker-messages'
 
 /** What the server said last. Nothing here is ever a value that a person typed. */
 interface Contents {

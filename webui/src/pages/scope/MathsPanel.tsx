@@ -1,7 +1,7 @@
 import { ActionIcon, Button, TextInput } from '@mantine/core'
 import type { ScopeMath, ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
-import { FUNCTIONS } from '../../live/scope/expression'
+import { FUNCTIONS } from '../../live/scope/analysis/expression'
 import { Icon } from '../../widgets/layout/Icon'
 import { freeId, GREATEST_MATHS, mathProblem } from './setup'
 

@@ -1,6 +1,6 @@
 import { useT } from '../../i18n'
-import type { Measurement } from '../../live/scope/measure'
-import type { ScopeFrame } from '../../live/worker-messages'
+import type { Measurement } from '../../live/scope/analysis/measure'
+import type { ScopeFrame } from '../../live/worker/worker-messages'
 import { figure } from '../../widgets/numbers/format'
 import type { Shown } from './setup'
 

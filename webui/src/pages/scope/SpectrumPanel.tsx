@@ -1,7 +1,7 @@
 import { Checkbox, NativeSelect } from '@mantine/core'
 import { useMemo, useState } from 'react'
 import { useT } from '../../i18n'
-import { type WindowKind, WINDOWS } from '../../live/scope/spectrum'
+import { type WindowKind, WINDOWS } from '../../live/scope/analysis/spectrum'
 import { LinesPlot } from '../../plots/LinesPlot'
 import { figure } from '../../widgets/numbers/format'
 import type { PanelProps } from './panels'

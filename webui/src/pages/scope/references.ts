@@ -1,6 +1,6 @@
 import { useCallback, useState } from 'react'
 import { thinned } from '../../live/scope/decimate'
-import type { Overlay } from '../../live/worker-messages'
+import type { Overlay } from '../../live/worker/worker-messages'
 import type { PlotOverlay } from '../../plots/TimePlot'
 import type { Shown } from './setup'
 

@@ -1,9 +1,9 @@
-import type { FromPage, JogStart, JogStop, ToPage } from '../api/schema'
-import type { Columns } from './scope/decimate'
-import type { Measurement } from './scope/measure'
+import type { FromPage, JogStart, JogStop, ToPage } from '../../api/schema'
+import type { Columns } from '../scope/decimate'
+import type { Measurement } from '../scope/analysis/measure'
 import type { LinkState } from './socket'
-import type { Spectrogram, Spectrum, WindowKind } from './scope/spectrum'
-import type { TriggerSettings } from './scope/trigger'
+import type { Spectrogram, Spectrum, WindowKind } from '../scope/analysis/spectrum'
+import type { TriggerSettings } from '../scope/trigger'
 
 /** A channel to be sampled, shown as (drive's value × factor + offset). */
 export interface ScopeSource {

@@ -1,5 +1,5 @@
-import { exactJson } from '../api/exact'
-import type { FromPage, ToPage } from '../api/schema'
+import { exactJson } from '../../api/exact'
+import type { FromPage, ToPage } from '../../api/schema'
 
 /** What the rest needs of a WebSocket; tests bring their own. */
 export interface SocketLike {

@@ -1,7 +1,7 @@
 /// <reference lib="webworker" />
 import { DeadMan, RENEW_MS } from './deadman'
 import { EnablingHold } from './enabling'
-import { ScopeStore } from './scope/scope-store'
+import { ScopeStore } from '../scope/scope-store'
 import { BEAT_MS, LiveSocket, type SocketLike } from './socket'
 import type { FromWorker, ToWorker } from './worker-messages'
 

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import { measure } from './measure'
-import { Ring, Trace } from './ring'
+import { Ring, Trace } from '../ring'
 
 function traceOf(times: number[], values: number[]): Trace {
   const ring = new Ring(10_000)

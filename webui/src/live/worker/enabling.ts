@@ -1,4 +1,4 @@
-import type { JogStop } from '../api/schema'
+import type { JogStop } from '../../api/schema'
 
 /** With the 40 ms between looks the motion ends within 200 ms of the page's last sign of life. */
 export const SILENCE_MS = 140

@@ -1,4 +1,4 @@
-import type { Trace } from './ring'
+import type { Trace } from '../ring'
 
 /** Figures of one trace over a stretch of time, from every raw sample in it. */
 export interface Measurement {

@@ -1,5 +1,5 @@
 import { describe, expect, it, vi } from 'vitest'
-import type { JogStart } from '../api/schema'
+import type { JogStart } from '../../api/schema'
 import { DeadMan, RELEASED_MS, SILENCE_MS } from './deadman'
 import { backOff, LiveSocket, type SocketLike } from './socket'
 

@@ -1,4 +1,4 @@
-import type { CursorMoved, PeopleHere, PlotCursor } from '../../api/schema'
+import type { CursorMoved, PeopleHere, PlotCursor } from '../../../api/schema'
 
 export type PlotName = PlotCursor['plot']
 

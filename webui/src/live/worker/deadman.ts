@@ -1,4 +1,4 @@
-import type { JogRenew, JogStart, JogStop } from '../api/schema'
+import type { JogRenew, JogStart, JogStop } from '../../api/schema'
 
 /** Time between signs of life sent. */
 export const RENEW_MS = 40

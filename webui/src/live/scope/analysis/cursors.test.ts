@@ -5,7 +5,7 @@ import type {
   PeopleHere,
   PersonHere,
   PlotCursor,
-} from '../../api/schema'
+} from '../../../api/schema'
 import { cursorsOn, heldInside, isShared, Pointing } from './cursors'
 
 function here(state: InvitationView['state'], pages: Record<string, string>): PeopleHere {

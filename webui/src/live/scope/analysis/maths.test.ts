@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest'
 import { channelsOf, compile, ExpressionError, parse } from './expression'
 import { MathsChannel } from './maths'
-import { Ring, Trace } from './ring'
+import { Ring, Trace } from '../ring'
 import { EVEN, fft, spectrogram, spectrum, WINDOWS } from './spectrum'
 
 const value = (text: string, channels: Record<string, number> = {}) =>

@@ -1,5 +1,5 @@
 import { channelsOf, compile, type Node, parse, type Step } from './expression'
-import { Ring, Trace } from './ring'
+import { Ring, Trace } from '../ring'
 
 /**
  * A computed channel. It has the times of the first channel that its text names; the others are
