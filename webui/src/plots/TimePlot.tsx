@@ -3,10 +3,10 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/scope/decimate'
 import { figure } from '../widgets/numbers/format'
-import { axisLook } from './axis'
+import { axisLook } from './geometry/axis'
 import { listen, type PlotEvents } from './gestures'
-import { lineWidth } from './line-width'
-import { Extent, type Span, withAir } from './yscale'
+import { lineWidth } from './geometry/line-width'
+import { Extent, type Span, withAir } from './geometry/yscale'
 import { sharedCursor } from './shared-cursor'
 
 export interface PlotSeries {

@@ -1,6 +1,6 @@
 import { Button, NativeSelect } from '@mantine/core'
 import { useT } from '../../i18n'
-import type { Span } from '../../plots/yscale'
+import type { Span } from '../../plots/geometry/yscale'
 import { figure } from '../../widgets/numbers/format'
 import { NumberField } from '../../widgets/numbers/NumberField'
 
