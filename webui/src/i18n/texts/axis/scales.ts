@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Scales of position, speed and acceleration: origins, and how a person teaches them. */
 export const scales = {

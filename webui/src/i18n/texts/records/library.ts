@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 export const library = {
   'library.title': ['Library', '资料库'],

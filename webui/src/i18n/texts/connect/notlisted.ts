@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Connect page: drives that are not listed, line settings, further ports. */
 export const notListed = {

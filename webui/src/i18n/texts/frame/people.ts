@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Log-in, control, remote support, accounts. */
 export const people = {

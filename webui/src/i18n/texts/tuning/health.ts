@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Tune page: baseline, comparison and trend of an axis. */
 export const health = {

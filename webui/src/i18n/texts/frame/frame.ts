@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Frame, states, and words used everywhere. */
 export const frame = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Measurements on drives without a watchdog, and by the profile velocity. */
 export const unwatched = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Words of the server and its profiles: the key ends with the English text that it sends. */
 export const drive = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** The Scope page beyond its first words (those are in bench.ts). */
 export const scope = {

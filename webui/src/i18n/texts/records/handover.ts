@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Hand-over to the machine's controller, on the page Files. */
 export const handover = {

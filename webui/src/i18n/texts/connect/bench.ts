@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Pages about the bench as a whole: Connect, Scope, Files. */
 export const bench = {

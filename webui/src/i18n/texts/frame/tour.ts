@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** The guided tour of the demo. It names buttons by the words that stand on them. */
 export const tour = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Connect page: whether this computer is punctual enough. */
 export const preflight = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Functions of a drive: alarms and history, terminals, gains, mechanics, braking, watch list. */
 export const functions = {

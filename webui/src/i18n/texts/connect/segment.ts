@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Connect page: the picture and the link quality of an EtherCAT segment. */
 export const segment = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** The Recordings page with rerun's viewer. */
 export const recordings = {

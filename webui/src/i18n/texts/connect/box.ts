@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Connect page: name and network ports of a station with accounts. */
 export const box = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Pages about one axis: Overview, Motion, I/O, Alarms. */
 export const axis = {

@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** Whether writing an object can cause motion, and who says so. */
 export const motionClass = {

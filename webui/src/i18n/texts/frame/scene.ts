@@ -1,4 +1,4 @@
-import type { Texts } from '../types'
+import type { Texts } from '../../types'
 
 /** The bench in 3D. */
 export const scene = {
