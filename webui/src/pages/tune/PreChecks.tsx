@@ -4,7 +4,7 @@ import { useSay, useT } from '../../i18n'
 import * as live from '../../live/live'
 import { Icon } from '../../widgets/layout/Icon'
 import { Panel } from '../../widgets/layout/Panel'
-import { CyclicExchange } from '../connect/CyclicExchange'
+import { CyclicExchange } from '../connect/buses/CyclicExchange'
 import { LimitFields, type useLimits } from '../response/plot/limits'
 import type { Check } from './steps'
 

@@ -1,12 +1,12 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { FoundDrive, JobInfo } from '../../api/schema'
-import { plainResult } from '../../api/results'
-import { useT } from '../../i18n'
-import { contents, setJob, subscribe } from '../../live/store'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { FoundDrive, JobInfo } from '../../../api/schema'
+import { plainResult } from '../../../api/results'
+import { useT } from '../../../i18n'
+import { contents, setJob, subscribe } from '../../../live/store'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** An empty bench with virtual drives at hand: one press finds and connects all of them. */
 export function VirtualBench({

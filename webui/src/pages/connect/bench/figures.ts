@@ -1,4 +1,4 @@
-import type { Quality } from '../../api/schema'
+import type { Quality } from '../../../api/schema'
 
 /** The pictures of the segment show these, and a counter above shows the repeats. */
 const SHOWN_ELSEWHERE = /^(cyclic_(?!bus_load)|late_below_|mailbox_repeats$)/

@@ -1,12 +1,12 @@
 import { Button, NumberInput, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { DriveSummary, MissingPort } from '../../api/schema'
-import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { ProfileText } from '../../widgets/profile-text/ProfileText'
-import { useSay } from '../../widgets/profile-text/texts'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { DriveSummary, MissingPort } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { ProfileText } from '../../../widgets/profile-text/ProfileText'
+import { useSay } from '../../../widgets/profile-text/texts'
+import { useAction } from '../../../widgets/requests/useAction'
 
 const NAMES = { ethercat: 'EtherCAT', canopen: 'CANopen', modbus: 'Modbus', mlink: 'MLink' }
 const GROUPS_SHOWN = 4

@@ -1,5 +1,5 @@
-import type { FoundDrive, ImportedDescription } from '../../api/schema'
-import { useSay, useT } from '../../i18n'
+import type { FoundDrive, ImportedDescription } from '../../../api/schema'
+import { useSay, useT } from '../../../i18n'
 import { ProfileExport } from './ProfileExport'
 
 type Finding = ImportedDescription['findings'][number]

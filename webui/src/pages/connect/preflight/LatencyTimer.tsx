@@ -1,10 +1,10 @@
 import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { LatencyTimerInfo } from '../../api/schema'
-import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { LatencyTimerInfo } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { serialPortOf } from './preflight'
 
 /** For how long the adapter of a URL holds answers back; lowered and restored by a press. */

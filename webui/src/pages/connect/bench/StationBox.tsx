@@ -1,12 +1,12 @@
 import { Button, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { BoxInfo } from '../../api/schema'
-import { hasRight, useSession } from '../../app/people/session'
-import { type T, useT } from '../../i18n'
-import { Panel } from '../../widgets/layout/Panel'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { BoxInfo } from '../../../api/schema'
+import { hasRight, useSession } from '../../../app/people/session'
+import { type T, useT } from '../../../i18n'
+import { Panel } from '../../../widgets/layout/Panel'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 type Port = BoxInfo['ports'][number]
 

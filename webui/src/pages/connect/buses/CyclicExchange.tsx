@@ -1,11 +1,11 @@
 import { Button, NativeSelect } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { Bus } from '../../api/schema'
-import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { Said } from '../../widgets/messages/Said'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { Bus } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { Said } from '../../../widgets/messages/Said'
+import { useAction } from '../../../widgets/requests/useAction'
 
 const CYCLES_US = [250, 500, 1000, 2000, 4000, 8000]
 

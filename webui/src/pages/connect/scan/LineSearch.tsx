@@ -1,12 +1,12 @@
 import { Button } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { LineSearchResult } from '../../api/schema'
-import { useT } from '../../i18n'
-import { setJob, useJob } from '../../live/store'
-import { JobNote } from '../../widgets/jobs/JobNote'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { LineSearchResult } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { setJob, useJob } from '../../../live/store'
+import { JobNote } from '../../../widgets/jobs/JobNote'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** A serial line whose baud rate is unknown; virtual wires have none. */
 export function isSerial(url: string): boolean {

@@ -1,6 +1,6 @@
-import type { Quality } from '../../api/schema'
-import { known, useT } from '../../i18n'
-import { Said } from '../../widgets/messages/Said'
+import type { Quality } from '../../../api/schema'
+import { known, useT } from '../../../i18n'
+import { Said } from '../../../widgets/messages/Said'
 import { figures } from './figures'
 
 const COUNTERS = [

@@ -1,4 +1,4 @@
-import type { DescribedDevice, FoundDrive } from '../../api/schema'
+import type { DescribedDevice, FoundDrive } from '../../../api/schema'
 
 /** What a profile may be called; the server checks the same. */
 export const PROFILE_NAME = /^[a-z][a-z0-9_]{0,59}$/
