@@ -10,7 +10,7 @@ import { Panel } from '../../widgets/layout/Panel'
 import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { useAction } from '../../widgets/requests/useAction'
 import { useWrong } from '../../widgets/numbers/useWrong'
-import { storedChannels } from '../scope/channels'
+import { storedChannels } from '../scope/setup/channels'
 import { useScopeChannels } from '../scope/useScope'
 
 const KINDS = ['none', 'rising', 'falling', 'change', 'fault'] as const

@@ -5,7 +5,7 @@ import { fixed } from '../response/plot/bode'
 import { Legend } from '../response/plot/Legend'
 import type { Step } from '../response/results'
 import { StepPlot, type Trace } from '../response/plot/StepPlot'
-import { TRACE_COLORS } from '../scope/channels'
+import { TRACE_COLORS } from '../scope/setup/channels'
 import { engineering } from './steps'
 
 /** A step's curves and its numbers; `over` is an earlier one, drawn on the same axes. */

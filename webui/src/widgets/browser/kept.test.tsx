@@ -8,7 +8,7 @@ import type { Session } from '../../api/schema'
 import { setLanguage } from '../../i18n'
 import { subscribe } from '../../live/store'
 import { useRemembered } from './remembered'
-import { EMPTY, storedSetup, storeSetup } from '../../pages/scope/setup'
+import { EMPTY, storedSetup, storeSetup } from '../../pages/scope/setup/setup'
 import { setOriginal } from '../profile-text/texts'
 
 const refuse = () => {

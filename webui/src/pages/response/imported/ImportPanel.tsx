@@ -10,7 +10,7 @@ import { Panel } from '../../../widgets/layout/Panel'
 import { ProblemNote } from '../../../widgets/messages/ProblemNote'
 import { useAction } from '../../../widgets/requests/useAction'
 import { useWrong, type Wrong } from '../../../widgets/numbers/useWrong'
-import { TRACE_COLORS } from '../../scope/channels'
+import { TRACE_COLORS } from '../../scope/setup/channels'
 import {
   guessed,
   INPUT_UNITS,

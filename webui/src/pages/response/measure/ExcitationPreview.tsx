@@ -5,7 +5,7 @@ import { useT } from '../../../i18n'
 import { figure } from '../../../widgets/numbers/format'
 import { ProblemNote } from '../../../widgets/messages/ProblemNote'
 import { useAnswer } from '../../../widgets/requests/useAnswer'
-import { TRACE_COLORS } from '../../scope/channels'
+import { TRACE_COLORS } from '../../scope/setup/channels'
 import { fixed, hertz } from '../plot/bode'
 import { StepPlot } from '../plot/StepPlot'
 

@@ -1,6 +1,6 @@
 import { ActionIcon, Button, NativeSelect } from '@mantine/core'
-import { useT } from '../../i18n'
-import { Icon } from '../../widgets/layout/Icon'
+import { useT } from '../../../i18n'
+import { Icon } from '../../../widgets/layout/Icon'
 
 const WINDOWS = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60]
 

@@ -1,7 +1,7 @@
 import { useMemo, useState } from 'react'
-import { useT } from '../../i18n'
-import { HeatMap } from '../../plots/HeatMap'
-import type { PanelProps } from './panels'
+import { useT } from '../../../i18n'
+import { HeatMap } from '../../../plots/HeatMap'
+import type { PanelProps } from '../panels'
 import { TracePicker } from './TracePicker'
 import { useAnalysis } from './useAnalysis'
 

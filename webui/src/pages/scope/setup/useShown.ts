@@ -1,5 +1,5 @@
-import type { ScopeSetup } from '../../api/schema'
-import { useDrives } from '../../live/store'
+import type { ScopeSetup } from '../../../api/schema'
+import { useDrives } from '../../../live/store'
 import { type Infos, infoOf, mathProblem, scaleOf, type Shown } from './setup'
 
 /** The traces of a set-up as they are shown: those of drives that are here, then computed ones. */

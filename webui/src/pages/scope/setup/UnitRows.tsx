@@ -1,7 +1,7 @@
 import { NativeSelect, TextInput } from '@mantine/core'
-import type { ScopeTrace } from '../../api/schema'
-import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/numbers/NumberField'
+import type { ScopeTrace } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 import { type Infos, infoOf } from './setup'
 
 /** In which unit each chosen channel is shown. */

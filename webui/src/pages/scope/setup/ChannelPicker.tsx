@@ -1,15 +1,15 @@
 import { Button, Checkbox, Modal, NativeSelect, TextInput } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { useT } from '../../i18n'
-import { loadRows } from '../../live/live'
-import { contents, useDrives } from '../../live/store'
-import { matches } from '../parameters/filters'
-import type { ScopeSetup } from '../../api/schema'
-import { useRows } from '../../widgets/profile-text/rows'
+import { useT } from '../../../i18n'
+import { loadRows } from '../../../live/live'
+import { contents, useDrives } from '../../../live/store'
+import { matches } from '../../parameters/filters'
+import type { ScopeSetup } from '../../../api/schema'
+import { useRows } from '../../../widgets/profile-text/rows'
 import { type Channel, drawable } from './channels'
 import { GREATEST_CHANNELS, withChannels } from './setup'
 import { UnitRows } from './UnitRows'
-import { useScopeChannels } from './useScope'
+import { useScopeChannels } from '../useScope'
 
 const GREATEST_LIST = 120
 

@@ -1,7 +1,7 @@
 // @vitest-environment happy-dom
-import { asked, refusal, serve } from '../../testing/page'
+import { asked, refusal, serve } from '../../../testing/page'
 import { expect, it } from 'vitest'
-import { problemOf, setConnection, setCsrf, UNREACHABLE } from '../../api/client'
+import { problemOf, setConnection, setCsrf, UNREACHABLE } from '../../../api/client'
 import { loadSnapshot, storeSnapshot } from './snapshot'
 
 it('stores a snapshot as this page: the server takes no change without its token', async () => {

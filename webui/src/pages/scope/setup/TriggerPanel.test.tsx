@@ -1,9 +1,9 @@
 // @vitest-environment happy-dom
-import { shown } from '../../testing/page'
+import { shown } from '../../../testing/page'
 import { screen } from '@testing-library/react'
 import { expect, it } from 'vitest'
-import type { DriveSummary } from '../../api/schema'
-import { setDrives } from '../../live/store'
+import type { DriveSummary } from '../../../api/schema'
+import { setDrives } from '../../../live/store'
 import { EMPTY } from './setup'
 import { TriggerPanel } from './TriggerPanel'
 

@@ -1,7 +1,7 @@
 import { useState } from 'react'
-import { useT } from '../../i18n'
-import { XyPlot } from '../../plots/XyPlot'
-import type { PanelProps } from './panels'
+import { useT } from '../../../i18n'
+import { XyPlot } from '../../../plots/XyPlot'
+import type { PanelProps } from '../panels'
 import { TracePicker } from './TracePicker'
 import { useAnalysis } from './useAnalysis'
 

@@ -1,9 +1,9 @@
 import { ActionIcon, Button, TextInput } from '@mantine/core'
-import type { ScopeMath, ScopeSetup } from '../../api/schema'
-import { useT } from '../../i18n'
-import { FUNCTIONS } from '../../live/scope/analysis/expression'
-import { Icon } from '../../widgets/layout/Icon'
-import { freeId, GREATEST_MATHS, mathProblem } from './setup'
+import type { ScopeMath, ScopeSetup } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { FUNCTIONS } from '../../../live/scope/analysis/expression'
+import { Icon } from '../../../widgets/layout/Icon'
+import { freeId, GREATEST_MATHS, mathProblem } from '../setup/setup'
 
 /** Computed channels: their names, units and texts. */
 export function MathsPanel({

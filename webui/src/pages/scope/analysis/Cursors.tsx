@@ -1,6 +1,6 @@
-import { useT } from '../../i18n'
-import { figure } from '../../widgets/numbers/format'
-import { NumberField } from '../../widgets/numbers/NumberField'
+import { useT } from '../../../i18n'
+import { figure } from '../../../widgets/numbers/format'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 
 /** The cursors' times as numbers, for the keyboard and for exact places. */
 export function Cursors({

@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import type { ScopeChannelInfo, ScopeSetup } from '../../api/schema'
+import type { ScopeChannelInfo, ScopeSetup } from '../../../api/schema'
 import {
   configOf,
   EMPTY,

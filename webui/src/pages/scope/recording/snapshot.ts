@@ -1,6 +1,6 @@
-import { api, ask } from '../../api/client'
-import type { ScopeSetup, SnapshotHeader, SnapshotTrace } from '../../api/schema'
-import type { Samples } from '../../live/worker/worker-messages'
+import { api, ask } from '../../../api/client'
+import type { ScopeSetup, SnapshotHeader, SnapshotTrace } from '../../../api/schema'
+import type { Samples } from '../../../live/worker/worker-messages'
 
 const MAGIC = 'SDSNAP1\n'
 

@@ -1,8 +1,8 @@
 import { Button, NativeSelect } from '@mantine/core'
-import { useT } from '../../i18n'
-import type { Span } from '../../plots/geometry/yscale'
-import { figure } from '../../widgets/numbers/format'
-import { NumberField } from '../../widgets/numbers/NumberField'
+import { useT } from '../../../i18n'
+import type { Span } from '../../../plots/geometry/yscale'
+import { figure } from '../../../widgets/numbers/format'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 
 /** The y scale of each unit: following the traces, or fixed between two numbers. */
 export function RangePanel({

@@ -1,8 +1,8 @@
-import { useT } from '../../i18n'
-import type { Measurement } from '../../live/scope/analysis/measure'
-import type { ScopeFrame } from '../../live/worker/worker-messages'
-import { figure } from '../../widgets/numbers/format'
-import type { Shown } from './setup'
+import { useT } from '../../../i18n'
+import type { Measurement } from '../../../live/scope/analysis/measure'
+import type { ScopeFrame } from '../../../live/worker/worker-messages'
+import { figure } from '../../../widgets/numbers/format'
+import type { Shown } from '../setup/setup'
 
 /** Older than this counts as “nothing comes”. */
 const SILENT_S = 1

@@ -1,6 +1,6 @@
 import { useEffect, useRef, useState } from 'react'
-import * as live from '../../live/live'
-import type { QuestionKind, Questions } from '../../live/worker/worker-messages'
+import * as live from '../../../live/live'
+import type { QuestionKind, Questions } from '../../../live/worker/worker-messages'
 
 const PERIOD_MS = 300
 

@@ -1,9 +1,9 @@
 import { Button, NativeSelect } from '@mantine/core'
-import type { ScopeSetup } from '../../api/schema'
-import { useT } from '../../i18n'
-import { useDrives } from '../../live/store'
-import type { ScopeFrame } from '../../live/worker/worker-messages'
-import { NumberField } from '../../widgets/numbers/NumberField'
+import type { ScopeSetup } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { useDrives } from '../../../live/store'
+import type { ScopeFrame } from '../../../live/worker/worker-messages'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 import { needsBit, needsDrive, needsHigh, needsLevel, type Shown } from './setup'
 
 const MODES = ['off', 'auto', 'normal', 'single'] as const

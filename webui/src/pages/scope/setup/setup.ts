@@ -1,10 +1,10 @@
-import type { ScopeChannelInfo, ScopeMath, ScopeSetup, ScopeTrace } from '../../api/schema'
-import { ExpressionError, parse } from '../../live/scope/analysis/expression'
-import type { TriggerSettings } from '../../live/scope/trigger'
-import type { ScopeConfig, ScopeSource, ScopeTrigger } from '../../live/worker/worker-messages'
-import { type Span, sound } from '../../plots/geometry/yscale'
-import { keep, kept } from '../../widgets/browser/kept'
-import { STATUS_WORD, VELOCITY_ACTUAL } from '../../widgets/parameters/objects'
+import type { ScopeChannelInfo, ScopeMath, ScopeSetup, ScopeTrace } from '../../../api/schema'
+import { ExpressionError, parse } from '../../../live/scope/analysis/expression'
+import type { TriggerSettings } from '../../../live/scope/trigger'
+import type { ScopeConfig, ScopeSource, ScopeTrigger } from '../../../live/worker/worker-messages'
+import { type Span, sound } from '../../../plots/geometry/yscale'
+import { keep, kept } from '../../../widgets/browser/kept'
+import { STATUS_WORD, VELOCITY_ACTUAL } from '../../../widgets/parameters/objects'
 import type { Channel } from './channels'
 
 export const GREATEST_CHANNELS = 16

@@ -1,6 +1,6 @@
 import { NativeSelect } from '@mantine/core'
-import { useT } from '../../i18n'
-import type { Shown } from './setup'
+import { useT } from '../../../i18n'
+import type { Shown } from '../setup/setup'
 
 export function TracePicker({
   shown,

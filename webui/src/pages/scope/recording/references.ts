@@ -1,8 +1,8 @@
 import { useCallback, useState } from 'react'
-import { thinned } from '../../live/scope/decimate'
-import type { Overlay } from '../../live/worker/worker-messages'
-import type { PlotOverlay } from '../../plots/TimePlot'
-import type { Shown } from './setup'
+import { thinned } from '../../../live/scope/decimate'
+import type { Overlay } from '../../../live/worker/worker-messages'
+import type { PlotOverlay } from '../../../plots/TimePlot'
+import type { Shown } from '../setup/setup'
 
 /** A curve that stays in sight for comparison; times from what was shown as zero. */
 export interface Reference {

@@ -1,6 +1,10 @@
-import type { ParameterRow } from '../../api/schema'
-import { isText } from '../../widgets/numbers/format'
-import { POSITION_ACTUAL, TORQUE_ACTUAL, VELOCITY_ACTUAL } from '../../widgets/parameters/objects'
+import type { ParameterRow } from '../../../api/schema'
+import { isText } from '../../../widgets/numbers/format'
+import {
+  POSITION_ACTUAL,
+  TORQUE_ACTUAL,
+  VELOCITY_ACTUAL,
+} from '../../../widgets/parameters/objects'
 import { storedSetup } from './setup'
 
 export interface Channel {
