@@ -1,6 +1,6 @@
-import type { ParameterRow, ThreeWayRow } from '../../api/schema'
-import { useT } from '../../i18n'
-import { ValueTable } from '../../widgets/parameters/ValueTable'
+import type { ParameterRow, ThreeWayRow } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ValueTable } from '../../../widgets/parameters/ValueTable'
 
 /** Rows whose value in the set differs from the drive's can be written there. */
 const canTick = (row: ThreeWayRow) =>

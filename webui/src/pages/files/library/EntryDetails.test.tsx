@@ -1,9 +1,9 @@
 // @vitest-environment happy-dom
-import { refusal, sent, serve, settled, shown, type } from '../../testing/page'
+import { refusal, sent, serve, settled, shown, type } from '../../../testing/page'
 import { fireEvent, screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, describe, expect, it, vi } from 'vitest'
-import type { LibraryEntry } from '../../api/schema'
+import type { LibraryEntry } from '../../../api/schema'
 import { EntryDetails } from './EntryDetails'
 
 const entry = { id: 7, kind: 'report', versions: 1, notes: 'old', tags: ['a'] } as LibraryEntry

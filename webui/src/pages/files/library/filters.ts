@@ -1,5 +1,5 @@
-import type { LibraryEntry } from '../../api/schema'
-import { dayStart } from '../../widgets/requests/days'
+import type { LibraryEntry } from '../../../api/schema'
+import { dayStart } from '../../../widgets/requests/days'
 
 export type LibraryKind = LibraryEntry['kind']
 export const KINDS: readonly LibraryKind[] = ['set', 'recording', 'measurement', 'report']

@@ -1,5 +1,5 @@
-import type { HandoverConflict } from '../../api/schema'
-import { useT } from '../../i18n'
+import type { HandoverConflict } from '../../../api/schema'
+import { useT } from '../../../i18n'
 
 const MARKS: Record<HandoverConflict['consequence'], string> = {
   gain: 'differs',

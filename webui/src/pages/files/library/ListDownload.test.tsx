@@ -1,5 +1,5 @@
 // @vitest-environment happy-dom
-import { serve, settled, shown } from '../../testing/page'
+import { serve, settled, shown } from '../../../testing/page'
 import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { expect, it } from 'vitest'

@@ -1,11 +1,11 @@
 import { Button, NumberInput } from '@mantine/core'
 import { useRef, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { DriveSummary, HandoverComparison } from '../../api/schema'
-import { useT } from '../../i18n'
-import { Icon } from '../../widgets/layout/Icon'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { DriveSummary, HandoverComparison } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { Icon } from '../../../widgets/layout/Icon'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { ConflictTable } from './ConflictTable'
 
 /** A controller's list against our set and the drive: what the controller will overwrite. */

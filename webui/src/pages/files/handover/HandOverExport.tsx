@@ -1,18 +1,18 @@
 import { Button, Checkbox, FileInput, NativeSelect, TextInput } from '@mantine/core'
 import { useState } from 'react'
-import { api, ask } from '../../api/client'
+import { api, ask } from '../../../api/client'
 import type {
   DriveSummary,
   HandoverRequest,
   HandoverResult,
   LibraryEntry,
   SegmentAxis,
-} from '../../api/schema'
-import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+} from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { SegmentAxes } from './SegmentAxes'
-import { offerDownload } from './sets'
+import { offerDownload } from '../sets/sets'
 
 type Format = HandoverRequest['format']
 type Rows = 'all' | 'tuned' | 'not_default' | 'chosen'

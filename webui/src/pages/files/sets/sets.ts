@@ -1,7 +1,7 @@
 import { useCallback, useEffect, useState } from 'react'
-import { API_ROOT, api, ask, problemOf } from '../../api/client'
-import type { Problem, StoredSet } from '../../api/schema'
-import { useLink } from '../../live/store'
+import { API_ROOT, api, ask, problemOf } from '../../../api/client'
+import type { Problem, StoredSet } from '../../../api/schema'
+import { useLink } from '../../../live/store'
 
 /** Stored parameter sets, newest first. */
 export function useSets() {

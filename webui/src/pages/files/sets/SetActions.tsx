@@ -1,11 +1,11 @@
 import { Button, Checkbox, Modal, Textarea, TextInput } from '@mantine/core'
 import { useRef, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { DriveSummary, ImportedList } from '../../api/schema'
-import { useSay, useT } from '../../i18n'
-import { Icon } from '../../widgets/layout/Icon'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { DriveSummary, ImportedList } from '../../../api/schema'
+import { useSay, useT } from '../../../i18n'
+import { Icon } from '../../../widgets/layout/Icon'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** Names the server takes (SaveSetRequest.file). */
 const NAME = /^\w[\w .-]{0,100}$/

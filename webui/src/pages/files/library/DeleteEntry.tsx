@@ -1,8 +1,8 @@
-import { api, ask } from '../../api/client'
-import type { LibraryEntry } from '../../api/schema'
-import { useT } from '../../i18n'
-import { ConfirmDelete } from '../../widgets/messages/ConfirmDelete'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { LibraryEntry } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { ConfirmDelete } from '../../../widgets/messages/ConfirmDelete'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** Sets are archived and can be restored; a file of the station is gone for good. */
 export function DeleteEntry({

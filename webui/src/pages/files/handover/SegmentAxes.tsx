@@ -1,9 +1,9 @@
 import { ActionIcon, Button, NativeSelect } from '@mantine/core'
-import type { DriveSummary, SegmentAxis } from '../../api/schema'
-import { useT } from '../../i18n'
-import { useDrives } from '../../live/store'
-import { Icon } from '../../widgets/layout/Icon'
-import { useSets } from './sets'
+import type { DriveSummary, SegmentAxis } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { useDrives } from '../../../live/store'
+import { Icon } from '../../../widgets/layout/Icon'
+import { useSets } from '../sets/sets'
 
 /** The drives of one list in the order of the cable, each with its parameter set. */
 export function SegmentAxes({

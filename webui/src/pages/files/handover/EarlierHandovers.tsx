@@ -1,11 +1,11 @@
 import { Button } from '@mantine/core'
 import { useEffect, useState } from 'react'
-import { api, ask } from '../../api/client'
-import type { DriveSummary, HandedOverInfo, HandoverChanges } from '../../api/schema'
-import { useT } from '../../i18n'
-import { dateTime } from '../../widgets/numbers/format'
-import { ProblemNote } from '../../widgets/messages/ProblemNote'
-import { useAction } from '../../widgets/requests/useAction'
+import { api, ask } from '../../../api/client'
+import type { DriveSummary, HandedOverInfo, HandoverChanges } from '../../../api/schema'
+import { useT } from '../../../i18n'
+import { dateTime } from '../../../widgets/numbers/format'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { ConflictTable } from './ConflictTable'
 
 /** What was handed over before; the drive is read again to say what has changed since. */

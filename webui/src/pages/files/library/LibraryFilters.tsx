@@ -1,6 +1,6 @@
 import { Checkbox, NativeSelect, TextInput } from '@mantine/core'
-import type { TagCount } from '../../api/schema'
-import { useT } from '../../i18n'
+import type { TagCount } from '../../../api/schema'
+import { useT } from '../../../i18n'
 import { type Filters, KINDS, type LibraryKind } from './filters'
 
 /** What to show of the library. */

@@ -1,8 +1,8 @@
 import { useCallback, useRef, useState } from 'react'
-import { api, ask, problemOf } from '../../api/client'
-import type { LibraryEntry, LibraryPage, MessageInfo, Problem, TagCount } from '../../api/schema'
-import { useLink } from '../../live/store'
-import { useSearch } from '../../widgets/requests/useSearch'
+import { api, ask, problemOf } from '../../../api/client'
+import type { LibraryEntry, LibraryPage, MessageInfo, Problem, TagCount } from '../../../api/schema'
+import { useLink } from '../../../live/store'
+import { useSearch } from '../../../widgets/requests/useSearch'
 import { type Filters, queryOf } from './filters'
 
 const PAGE = 50
