@@ -14,9 +14,9 @@ import { useWrong } from '../../../widgets/numbers/useWrong'
 import { asAutotune } from '../../response/results'
 import { useToolJob } from '../../response/useToolJob'
 import { AutotuneReport } from './AutotuneReport'
-import { SchemeFields, useScheme } from '../schemes'
-import { stepOf } from '../steps'
-import type { Measured } from '../tools/ToolPanel'
+import { SchemeFields, useScheme } from '../steps/schemes'
+import { stepOf } from '../steps/steps'
+import type { Measured } from '../tools/form/ToolPanel'
 
 const MARKS = ['robust', 'balanced', 'fast'] as const
 const LOADS = ['auto', 'stiff', 'medium', 'compliant'] as const

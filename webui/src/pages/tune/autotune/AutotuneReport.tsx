@@ -14,9 +14,9 @@ import { type Autotune, filesOf } from '../../response/results'
 import { usePrediction } from '../../response/design/usePrediction'
 import { TRACE_COLORS } from '../../scope/setup/channels'
 import { CandidateTable } from './CandidateTable'
-import { forceOf } from '../force'
-import { InertiaResult } from '../InertiaPanel'
-import { StepNumbers } from '../StepNumbers'
+import { forceOf } from './force'
+import { InertiaResult } from '../steps/InertiaPanel'
+import { StepNumbers } from '../steps/StepNumbers'
 import { VerdictTable } from './VerdictTable'
 
 const undone = new Set<string>()

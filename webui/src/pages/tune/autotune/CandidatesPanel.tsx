@@ -14,7 +14,7 @@ import type { Candidate } from '../../response/results'
 import { remember } from '../../response/design/undo'
 import { UndoNote } from '../../response/design/UndoNote'
 import { CandidateTable } from './CandidateTable'
-import { amount } from '../steps'
+import { amount } from '../steps/steps'
 
 /** What the server answers when a manual documents no notch. */
 const NONE_DOCUMENTED = 'urn:servodeck:not-allowed'

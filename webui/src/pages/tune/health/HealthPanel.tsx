@@ -9,8 +9,8 @@ import { HealthPermission } from './HealthPermission'
 import { HealthStations } from './HealthStations'
 import { HealthTrend } from './HealthTrend'
 import { Findings, SignBaseline } from './HealthVerdict'
-import { MotionWarning } from '../MotionWarning'
-import { type Measured, MeasuredStart, ToolPanel, useToolRun } from '../tools/ToolPanel'
+import { MotionWarning } from '../steps/MotionWarning'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from '../tools/form/ToolPanel'
 import { useHealth } from './useHealth'
 
 const INITIAL = { rounds: LEAST_ROUNDS }
