@@ -1,12 +1,12 @@
 // @vitest-environment happy-dom
-import { sent, serve, settled, shown, type } from '../../testing/page'
+import { sent, serve, settled, shown, type } from '../../../testing/page'
 import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, expect, it } from 'vitest'
-import type { AxisState, HomingMethodInfo } from '../../api/schema'
-import { contents } from '../../live/store'
+import type { AxisState, HomingMethodInfo } from '../../../api/schema'
+import { contents } from '../../../live/store'
 import { HomingPanel } from './HomingPanel'
-import { travelUnit } from './travelUnit'
+import { travelUnit } from '../fields/travelUnit'
 
 const METHOD = { method: 1, name: 'Limit switch', help: '', notes: '', source: '' }
 const STATE = {

@@ -1,4 +1,4 @@
-import type { AxisRecordInfo, AxisState, MoveRequest } from '../../api/schema'
+import type { AxisRecordInfo, AxisState, MoveRequest } from '../../../api/schema'
 
 export type TravelName = NonNullable<MoveRequest['unit']>
 

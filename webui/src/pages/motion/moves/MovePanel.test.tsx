@@ -1,14 +1,14 @@
 // @vitest-environment happy-dom
-import { serve, settled, shown, type } from '../../testing/page'
+import { serve, settled, shown, type } from '../../../testing/page'
 import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { expect, it } from 'vitest'
-import type { AxisState, DriveSummary } from '../../api/schema'
-import { askBuses } from '../../live/buses'
-import { contents, publish } from '../../live/store'
+import type { AxisState, DriveSummary } from '../../../api/schema'
+import { askBuses } from '../../../live/buses'
+import { contents, publish } from '../../../live/store'
 import { MovePanel } from './MovePanel'
 import { SignalPanel } from './SignalPanel'
-import { travelUnit } from './travelUnit'
+import { travelUnit } from '../fields/travelUnit'
 
 const STATE = {
   drive: 'x',

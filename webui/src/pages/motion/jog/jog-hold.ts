@@ -1,4 +1,4 @@
-import type { JogStop } from '../../api/schema'
+import type { JogStop } from '../../../api/schema'
 
 /**
  * After so long without a beat the page was too busy to see a release. Only a drawn frame counts

@@ -1,5 +1,5 @@
-import { useT } from '../../i18n'
-import { NumberField } from '../../widgets/numbers/NumberField'
+import { useT } from '../../../i18n'
+import { NumberField } from '../../../widgets/numbers/NumberField'
 import type { Typed } from './useMotionNumbers'
 
 /** Units of an axis by quantity, as its state shows them. */

@@ -1,9 +1,9 @@
 import { useEffect, useMemo, useRef, useState } from 'react'
-import type { JogEnded, JogGap } from '../../api/schema'
-import * as live from '../../live/live'
-import { contents, subscribe } from '../../live/store'
+import type { JogEnded, JogGap } from '../../../api/schema'
+import * as live from '../../../live/live'
+import { contents, subscribe } from '../../../live/store'
 import { JogHold } from './jog-hold'
-import type { TravelName } from './travelUnit'
+import type { TravelName } from '../fields/travelUnit'
 
 export interface JogSettings {
   speed: number

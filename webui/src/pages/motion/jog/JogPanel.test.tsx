@@ -1,11 +1,11 @@
 // @vitest-environment happy-dom
-import { posted, shown } from '../../testing/page'
+import { posted, shown } from '../../../testing/page'
 import { fireEvent, screen } from '@testing-library/react'
 import { beforeEach, expect, it } from 'vitest'
-import type { AxisState } from '../../api/schema'
-import { contents } from '../../live/store'
+import type { AxisState } from '../../../api/schema'
+import { contents } from '../../../live/store'
 import { JogPanel } from './JogPanel'
-import { travelUnit } from './travelUnit'
+import { travelUnit } from '../fields/travelUnit'
 
 const STATE = {
   drive: 'x',

@@ -1,7 +1,7 @@
 import { useState } from 'react'
-import type { AxisState } from '../../api/schema'
-import { keep, kept } from '../../widgets/browser/kept'
-import { useRecord } from '../../widgets/drive/useFunctions'
+import type { AxisState } from '../../../api/schema'
+import { keep, kept } from '../../../widgets/browser/kept'
+import { useRecord } from '../../../widgets/drive/useFunctions'
 import { possibleUnits, type TravelName, travelUnit } from './travelUnit'
 
 /** The unit of an axis' motions, kept in this browser. */

@@ -1,5 +1,5 @@
-import type { HomingMethodInfo } from '../../api/schema'
-import { useT } from '../../i18n'
+import type { HomingMethodInfo } from '../../../api/schema'
+import { useT } from '../../../i18n'
 
 const LEFT = 30
 const RIGHT = 410

@@ -1,4 +1,4 @@
-import { useRemembered } from '../../widgets/browser/remembered'
+import { useRemembered } from '../../../widgets/browser/remembered'
 import { placeIn, roundedUp, startIn, type TravelUnit } from './travelUnit'
 
 /** A number and its setter, as the fields take them. */

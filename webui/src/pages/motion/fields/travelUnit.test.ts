@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest'
-import type { AxisRecordInfo, AxisState } from '../../api/schema'
+import type { AxisRecordInfo, AxisState } from '../../../api/schema'
 import { placeIn, possibleUnits, roundedUp, startIn, travelUnit } from './travelUnit'
 
 const TURNS = { units: { position: 'rev', velocity: 'rpm', acceleration: 'rpm/s' } } as unknown
