@@ -1,11 +1,11 @@
 import { describe, expect, it } from 'vitest'
 import type { AxisRecordInfo, AxisState, GainBlock, TerminalInfo } from '../api/schema'
-import { grouped } from './gains/blocks'
-import { probeSettings } from './io/probe'
-import { polarityName, twins } from './io/terminals'
-import { travelOf } from './overview/travel'
-import { brakeCourse } from './setup/brake'
-import { complete, formOf, START, toMechanics } from './setup/mechanics'
+import { grouped } from '../pages/gains/blocks'
+import { probeSettings } from '../pages/io/probe'
+import { polarityName, twins } from '../pages/io/terminals'
+import { travelOf } from '../pages/overview/travel'
+import { brakeCourse } from '../pages/setup/brake'
+import { complete, formOf, START, toMechanics } from '../pages/setup/mechanics'
 
 function terminal(name: string, function_name: string, functions: [number, string][]) {
   return {
