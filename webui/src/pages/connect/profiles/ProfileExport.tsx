@@ -5,7 +5,7 @@ import { useT } from '../../../i18n'
 import { Icon } from '../../../widgets/layout/Icon'
 import { ProblemNote } from '../../../widgets/messages/ProblemNote'
 import { useAction } from '../../../widgets/requests/useAction'
-import { offerDownload } from '../../files/sets/sets'
+import { offerDownload } from '../../../widgets/browser/download'
 
 /** A profile as files for other tools: EDS, and ESI where the drive has EtherCAT. */
 export function ProfileExport({ profile, links }: Pick<ProfileInfo, 'profile' | 'links'>) {

@@ -12,7 +12,7 @@ import { useT } from '../../../i18n'
 import { ProblemNote } from '../../../widgets/messages/ProblemNote'
 import { useAction } from '../../../widgets/requests/useAction'
 import { SegmentAxes } from './SegmentAxes'
-import { offerDownload } from '../sets/sets'
+import { offerDownload } from '../../../widgets/browser/download'
 
 type Format = HandoverRequest['format']
 type Rows = 'all' | 'tuned' | 'not_default' | 'chosen'
