@@ -1,5 +1,6 @@
 import type { HomingMethodInfo } from '../../../api/schema'
 import { useT } from '../../../i18n'
+import { ArrowTip } from '../../../widgets/layout/drawn'
 
 const LEFT = 30
 const RIGHT = 410
@@ -39,19 +40,7 @@ export function HomingPicture({ method, name }: { method: HomingMethodInfo; name
   return (
     <svg className="homing-picture" viewBox="0 0 440 150" role="img" aria-label={name}>
       <title>{name}</title>
-      <defs>
-        <marker
-          id="home-tip"
-          viewBox="0 0 8 8"
-          refX="7"
-          refY="4"
-          markerWidth="7"
-          markerHeight="7"
-          orient="auto"
-        >
-          <path d="M0 0 8 4 0 8z" className="tip" />
-        </marker>
-      </defs>
+      <ArrowTip id="home-tip" />
       <line x1={LEFT} y1={RAIL} x2={RIGHT} y2={RAIL} className="rail" />
       <text x={LEFT} y={RAIL + 18} className="label">
         −
