@@ -18,6 +18,19 @@ export interface ShownRow {
   ends?: Ends
 }
 
+/** The row of an estimate, with its text by name; null is what cannot be known. */
+export const figureRow = (
+  text: Text,
+  name: string,
+  found: { value: number; ci95: NonNullable<Ends> } | null,
+  unit: string,
+): ShownRow => ({
+  name: text(name),
+  value: found?.value ?? null,
+  unit,
+  ends: found?.ci95 ?? null,
+})
+
 /** A table whose cells are texts. */
 export interface ShownTable {
   name: string

@@ -1,5 +1,5 @@
 import type { LoadSideResult } from '../../../../api/schema'
-import type { Ends, ShownNote, ShownRow, Text } from '../form/shown'
+import { figureRow, type ShownNote, type ShownRow, type Text } from '../form/shown'
 import { engineering } from '../../steps/steps'
 
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
@@ -22,29 +22,19 @@ export function loadSideNotes(result: LoadSideResult, text: Text): ShownNote[] {
 
 /** The figures; null is what cannot be known. */
 export function loadSideRows(result: LoadSideResult, text: Text): ShownRow[] {
-  const row = (
-    name: string,
-    found: { value: number; ci95: NonNullable<Ends> } | null,
-    unit: string,
-  ): ShownRow => ({
-    name: text(name),
-    value: found?.value ?? null,
-    unit,
-    ends: found?.ci95 ?? null,
-  })
   const least = result.stiffness_at_least_nm_per_rad
   const stiffness =
     least === null
-      ? row('stiffness', result.stiffness_nm_per_rad, 'N·m/rad')
+      ? figureRow(text, 'stiffness', result.stiffness_nm_per_rad, 'N·m/rad')
       : { name: text('stiffness_least'), value: least, unit: 'N·m/rad', ends: null }
   return [
-    row('backlash', result.backlash_deg, '°'),
-    row('backlash_motor', result.backlash_motor_rev, 'rev'),
-    row('lost_motion', result.lost_motion_deg, '°'),
+    figureRow(text, 'backlash', result.backlash_deg, '°'),
+    figureRow(text, 'backlash_motor', result.backlash_motor_rev, 'rev'),
+    figureRow(text, 'lost_motion', result.lost_motion_deg, '°'),
     stiffness,
-    row('locked_motor', result.locked_motor_hz, 'Hz'),
-    row('load_inertia', result.load_inertia_kgm2, 'kg·m²'),
-    row('error_span', result.error_span_deg, '°'),
+    figureRow(text, 'locked_motor', result.locked_motor_hz, 'Hz'),
+    figureRow(text, 'load_inertia', result.load_inertia_kgm2, 'kg·m²'),
+    figureRow(text, 'error_span', result.error_span_deg, '°'),
     ...result.error_orders.slice(0, ORDERS).map((each) => ({
       name: text('order', { order: String(each.order_per_rev) }),
       value: each.amplitude_deg,

@@ -1,5 +1,12 @@
 import type { DwellResult, VibrationResult } from '../../../../api/schema'
-import type { Ends, ShownNote, ShownRow, ShownTable, Text } from '../form/shown'
+import {
+  figureRow,
+  type Ends,
+  type ShownNote,
+  type ShownRow,
+  type ShownTable,
+  type Text,
+} from '../form/shown'
 import { engineering } from '../../steps/steps'
 
 /** As `backend/tools/vibration/texts.py` and `backend/tools/dwell/texts.py` have them. */
@@ -104,16 +111,6 @@ export function levelCurves(
 
 /** What a dwell excited; null is what cannot be known. */
 export function dwellRows(result: DwellResult, text: Text): ShownRow[] {
-  const row = (
-    name: string,
-    found: { value: number; ci95: NonNullable<Ends> } | null,
-    unit: string,
-  ): ShownRow => ({
-    name: text(name),
-    value: found?.value ?? null,
-    unit,
-    ends: found?.ci95 ?? null,
-  })
   return [
     {
       name: text('excitation'),
@@ -121,10 +118,10 @@ export function dwellRows(result: DwellResult, text: Text): ShownRow[] {
       unit: result.by === 'speed' ? 'rpm' : '%',
       ends: null,
     },
-    row('speed', result.speed_rpm, 'rpm'),
-    row('position', result.position_deg, '°'),
-    row('torque', result.torque_percent, '%'),
-    row('phase', result.phase_deg, '°'),
+    figureRow(text, 'speed', result.speed_rpm, 'rpm'),
+    figureRow(text, 'position', result.position_deg, '°'),
+    figureRow(text, 'torque', result.torque_percent, '%'),
+    figureRow(text, 'phase', result.phase_deg, '°'),
     ...result.harmonics.map((each) => ({
       name: text('harmonic', { multiple: String(each.multiple) }),
       value: each.speed_rpm,
