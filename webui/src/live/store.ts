@@ -147,7 +147,7 @@ export interface DriveIdentity {
   places: string[]
 }
 
-export function identityOf(drive: DriveSummary): DriveIdentity {
+function identityOf(drive: DriveSummary): DriveIdentity {
   const { profile, serial, ports } = drive as Pick<DriveSummary, 'profile'> & Partial<DriveSummary>
   const places = (ports ?? []).map(({ url, station }) => `${url} ${station}`)
   return { profile, serial: serial ?? null, places }

@@ -5,7 +5,7 @@ import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/numbers/format'
 import { axisLook } from './geometry/axis'
 
-export interface PlottedCurve {
+interface PlottedCurve {
   label: string
   color: string
   x: number[]

@@ -9,7 +9,7 @@ import { lineWidth } from './geometry/line-width'
 import { Extent, type Span, withAir } from './geometry/yscale'
 import { sharedCursor } from './shared-cursor'
 
-export interface PlotSeries {
+interface PlotSeries {
   label: string
   unit: string
   color: string
@@ -26,7 +26,7 @@ export interface PlotOverlay {
   values: number[]
 }
 
-export interface PlotFrame {
+interface PlotFrame {
   columns: Columns
   from: number
   to: number

@@ -24,7 +24,7 @@ export type AxisPage = (typeof AXIS_PAGES)[number]
 export type BenchPage = (typeof BENCH_PAGES)[number]
 export type Page = AxisPage | BenchPage
 
-export interface Route {
+interface Route {
   page: Page
   /** The axis of an axis page; on other pages the axis chosen last. */
   drive: string | null

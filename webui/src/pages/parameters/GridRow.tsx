@@ -292,7 +292,7 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
 }
 
 const EFFECTIVE = ['now', 'stopped', 'reenable', 'write_settings', 'power_cycle'] as const
-export type Effective = (typeof EFFECTIVE)[number]
+type Effective = (typeof EFFECTIVE)[number]
 
 /** The known words of when a value acts; anything newer reads as "not yet". */
 export function pendingKey(text: string): Effective | 'later' {

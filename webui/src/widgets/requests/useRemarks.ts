@@ -7,7 +7,7 @@ export interface Remarks {
 }
 
 /** What is sent: the own remarks, and what they were when the person began to change them. */
-export interface RemarksChange extends Remarks {
+interface RemarksChange extends Remarks {
   base_notes: string
   base_tags: string[]
 }

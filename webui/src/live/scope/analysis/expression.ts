@@ -25,12 +25,12 @@ export const FUNCTIONS = {
   highpass: 2,
   mean: 2,
 } as const
-export type FunctionName = keyof typeof FUNCTIONS
+type FunctionName = keyof typeof FUNCTIONS
 /** Functions whose second argument is a setting: a number, not a signal. */
 const CONSTANT_SECOND: readonly FunctionName[] = ['bit', 'lowpass', 'highpass', 'mean']
 const DEEPEST = 40
 
-export type ExpressionProblem =
+type ExpressionProblem =
   'empty' | 'unexpected' | 'end' | 'unknown' | 'arguments' | 'constant' | 'deep'
 
 /** What is wrong, and with which part of the text. */

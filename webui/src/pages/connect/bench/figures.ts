@@ -6,7 +6,7 @@ const UNITS: Record<string, string> = { us: 'µs', ms: 'ms', percent: '%', hz: '
 const FIXED: Record<string, string> = { baudrate: 'Bd' }
 
 /** One figure of a link for people: the unit apart from the name, which is never a variable's. */
-export interface Figure {
+interface Figure {
   name: string
   words: string
   value: string

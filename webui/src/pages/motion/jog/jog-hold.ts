@@ -15,7 +15,7 @@ interface Port {
 }
 
 /** The parts of a window that matter, so that a test can bring its own. */
-export interface Surroundings {
+interface Surroundings {
   isVisible(): boolean
   hasFocus(): boolean
   requestFrame(callback: () => void): number

@@ -5,7 +5,7 @@ import { nextStep, type StepName } from './path'
 export type Section = StepName | 'first' | 'automatic' | 'manual' | 'more'
 
 /** Steps that are done one by one, instead of *Tune automatically*. */
-export const MANUAL = ['inertia', 'response', 'notches', 'gains', 'verify'] as const
+const MANUAL = ['inertia', 'response', 'notches', 'gains', 'verify'] as const
 const isManual = (step: Section): boolean => (MANUAL as readonly Section[]).includes(step)
 
 /**

@@ -53,7 +53,7 @@ export function useToolRun(
   return { tool, text, fields, values, setValues, wrong, job, note, dismiss, start, begin }
 }
 
-export type ToolRun = ReturnType<typeof useToolRun>
+type ToolRun = ReturnType<typeof useToolRun>
 
 /** A tool's panel: lead, what starts it, how its job goes, and its answer. */
 export function ToolPanel({

@@ -21,7 +21,7 @@ export interface Candidate {
 }
 
 /** The EtherCAT segment of a drive; null where it has none. */
-export const segmentOf = (drive: DriveSummary): string | null =>
+const segmentOf = (drive: DriveSummary): string | null =>
   drive.ports.find((port) => port.kind === 'ethercat')?.url ?? null
 
 /** All other axes, those first that may be the partner. */
