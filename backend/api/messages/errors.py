@@ -47,7 +47,7 @@ STATUS: dict[type[DriveError], int] = {
 }
 
 #: Titles by kind of error, in English and the same for every occurrence (RFC 9457, section 3.1.3).
-#: The page has translations (`problemTitle` in `webui/src/i18n/texts/drive.ts`).
+#: The page has translations (`problemTitle` in `webui/src/i18n/texts/axis/drive.ts`).
 TITLES = {
     "drive-error": "Drive error",
     "link-timeout": "No answer in time",

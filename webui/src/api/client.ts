@@ -53,7 +53,7 @@ api.use({
 })
 
 /** Thrown by `ask`: what went wrong, as the server said it. */
-export class ProblemError extends Error {
+class ProblemError extends Error {
   constructor(readonly problem: Problem) {
     super(problem.detail)
   }

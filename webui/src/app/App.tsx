@@ -5,11 +5,11 @@ import * as live from '../live/live'
 import { contents, useDrives, useLink } from '../live/store'
 import { Arriving } from './notes/Arriving'
 import { Frame } from './Frame'
-import { AXIS, BENCH, fetchAhead } from './pages'
-import { isAxisPage, useRoute } from './router'
+import { AXIS, BENCH, fetchAhead } from './navigation/pages'
+import { isAxisPage, useRoute } from './navigation/router'
 import { SessionGate } from './people/SessionGate'
 import { StopButton } from './stop/StopButton'
-import { themeWith } from './theme'
+import { themeWith } from './styles/theme'
 
 export function App() {
   const t = useT()

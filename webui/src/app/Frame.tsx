@@ -4,9 +4,9 @@ import { known, problemTitle, useSay, useT } from '../i18n'
 import * as live from '../live/live'
 import { contents, useAxisState, useDrive, useDrives, useLink, useStore } from '../live/store'
 import { clock } from '../widgets/numbers/format'
-import { Icon } from '../widgets/Icon'
+import { Icon } from '../widgets/layout/Icon'
 import { PendingRestoresNote } from '../widgets/parameters/PendingRestoresNote'
-import { StateName } from '../widgets/StateName'
+import { StateName } from '../widgets/drive/StateName'
 import {
   AXIS_PAGES,
   BENCH_PAGES,
@@ -15,7 +15,7 @@ import {
   isAxisPage,
   type Page,
   useRoute,
-} from './router'
+} from './navigation/router'
 import { FaultElsewhere } from './notes/FaultElsewhere'
 import { AxisNotes } from './notes/AxisNotes'
 import { Late } from './notes/Late'
@@ -29,9 +29,9 @@ import { StopElsewhere } from './stop/StopElsewhere'
 import { SupportBar } from './people/SupportBar'
 import { Tour } from './tour/Tour'
 import { TurningNote } from './notes/TurningNote'
-import { linkLook, stateLook } from './states'
-import { useCanTune } from './useCanTune'
-import { useHasIo } from './useHasIo'
+import { linkLook, stateLook } from './navigation/states'
+import { useCanTune } from './navigation/useCanTune'
+import { useHasIo } from './navigation/useHasIo'
 
 /** What a thumb reaches on a phone: with an axis, and before there is one. */
 const HANDY = ['overview', 'parameters', 'motion', 'scope', 'alarms'] as const

@@ -1,6 +1,6 @@
 import { ActionIcon, Menu, useMantineColorScheme } from '@mantine/core'
 import { useT } from '../i18n'
-import { Icon } from '../widgets/Icon'
+import { Icon } from '../widgets/layout/Icon'
 import { useLink } from '../live/store'
 import { leave, useSession } from './people/session'
 import { setPlace, useHasTour } from './tour/tour'

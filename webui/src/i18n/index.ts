@@ -1,6 +1,6 @@
 import { useSyncExternalStore } from 'react'
 import type { JobInfo, Problem } from '../api/schema'
-import { keep, kept } from '../widgets/kept'
+import { keep, kept } from '../widgets/browser/kept'
 import { catalogue, type Key } from './catalogue'
 import { load, words, type Message } from './message'
 

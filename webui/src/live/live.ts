@@ -3,9 +3,9 @@ import type { FromPage, JogStart, JogStop, ToPage } from '../api/schema'
 import { addChat, addNotice, setCursor, setPeople, setPointer } from './people'
 import { forgetServerClock, heardServerTime } from './server-clock'
 import * as store from './store'
-import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker-messages'
+import type { FromWorker, QuestionKind, Questions, ToWorker } from './worker/worker-messages'
 
-const worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' })
+const worker = new Worker(new URL('./worker/worker.ts', import.meta.url), { type: 'module' })
 const post = (message: ToWorker) => worker.postMessage(message)
 
 let asked = 0

@@ -14,8 +14,8 @@ import type {
   StopResult,
 } from '../api/schema'
 import { serverNow } from './server-clock'
-import type { LinkState } from './socket'
-import type { TriggerState } from './worker-messages'
+import type { LinkState } from './worker/socket'
+import type { TriggerState } from './worker/worker-messages'
 
 /** What the server said last. Nothing here is ever a value that a person typed. */
 interface Contents {
@@ -147,7 +147,7 @@ export interface DriveIdentity {
   places: string[]
 }
 
-export function identityOf(drive: DriveSummary): DriveIdentity {
+function identityOf(drive: DriveSummary): DriveIdentity {
   const { profile, serial, ports } = drive as Pick<DriveSummary, 'profile'> & Partial<DriveSummary>
   const places = (ports ?? []).map(({ url, station }) => `${url} ${station}`)
   return { profile, serial: serial ?? null, places }

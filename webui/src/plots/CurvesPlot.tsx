@@ -3,9 +3,9 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/numbers/format'
-import { axisLook } from './axis'
+import { axisLook } from './geometry/axis'
 
-export interface PlottedCurve {
+interface PlottedCurve {
   label: string
   color: string
   x: number[]

@@ -2,7 +2,7 @@ import { useRef } from 'react'
 import { figure } from '../widgets/numbers/format'
 import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
-import { ticks } from './ticks'
+import { ticks } from './geometry/ticks'
 
 const LEFT = 62
 const BOTTOM = 40

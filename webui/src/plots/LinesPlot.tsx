@@ -2,8 +2,8 @@ import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import { figure } from '../widgets/numbers/format'
-import { axisLook } from './axis'
-import { lineWidth } from './line-width'
+import { axisLook } from './geometry/axis'
+import { lineWidth } from './geometry/line-width'
 import { sharedCursor } from './shared-cursor'
 
 /** A curve over a quantity other than time, with the value beneath the pointer. */

@@ -3,13 +3,13 @@ import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
 import type { Columns } from '../live/scope/decimate'
 import { figure } from '../widgets/numbers/format'
-import { axisLook } from './axis'
+import { axisLook } from './geometry/axis'
 import { listen, type PlotEvents } from './gestures'
-import { lineWidth } from './line-width'
-import { Extent, type Span, withAir } from './yscale'
+import { lineWidth } from './geometry/line-width'
+import { Extent, type Span, withAir } from './geometry/yscale'
 import { sharedCursor } from './shared-cursor'
 
-export interface PlotSeries {
+interface PlotSeries {
   label: string
   unit: string
   color: string
@@ -26,7 +26,7 @@ export interface PlotOverlay {
   values: number[]
 }
 
-export interface PlotFrame {
+interface PlotFrame {
   columns: Columns
   from: number
   to: number

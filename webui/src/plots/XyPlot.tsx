@@ -2,8 +2,8 @@ import { useMemo, useRef } from 'react'
 import { figure } from '../widgets/numbers/format'
 import { sheetOf, upwards, useDrawing } from './canvas'
 import { useSharedCursor } from './shared-cursor'
-import { range, ticks } from './ticks'
-import { nearestPoint, pointAt, type Range } from './xy-points'
+import { range, ticks } from './geometry/ticks'
+import { nearestPoint, pointAt, type Range } from './geometry/xy-points'
 
 const LEFT = 62
 const BOTTOM = 40

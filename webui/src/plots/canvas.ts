@@ -1,6 +1,6 @@
 import { type RefObject, useEffect } from 'react'
 
-export interface Sheet {
+interface Sheet {
   ctx: CanvasRenderingContext2D
   width: number
   height: number

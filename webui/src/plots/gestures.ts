@@ -1,5 +1,13 @@
 import type uPlot from 'uplot'
-import { moved, type Pinch, pinched, type Span, sound, wheelFactor, zoomed } from './yscale'
+import {
+  moved,
+  type Pinch,
+  pinched,
+  type Span,
+  sound,
+  wheelFactor,
+  zoomed,
+} from './geometry/yscale'
 
 /** What a hand on the plot asks for. Times are of the traces, not of the shown zero. */
 export interface PlotEvents {

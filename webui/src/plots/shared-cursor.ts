@@ -7,7 +7,7 @@ import {
   type Pointed,
   Pointing,
   type PlotName,
-} from '../live/scope/cursors'
+} from '../live/scope/analysis/cursors'
 import * as live from '../live/live'
 import { people } from '../live/people'
 import { subscribe } from '../live/store'

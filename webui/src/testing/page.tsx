@@ -8,7 +8,7 @@ import { act, cleanup, configure, render, type RenderResult } from '@testing-lib
 import { userEvent } from '@testing-library/user-event'
 import type { ReactElement, ReactNode } from 'react'
 import { afterEach } from 'vitest'
-import { themeWith } from '../app/theme'
+import { themeWith } from '../app/styles/theme'
 
 // Behind a proxy's path, where an address without it leads nowhere.
 const PLACE = 'http://bench/station/'

@@ -363,7 +363,7 @@ def test_the_page_has_its_own_title_for_every_type_of_problem() -> None:
     for module in ("backend.commands.server.serve", "backend.cli"):
         import_module(module)
     ours = {each.kind for each in _classes(DriveError) if _is_ours(each)}
-    source = (ROOT / "webui/src/i18n/texts/drive.ts").read_text("utf-8")
+    source = (ROOT / "webui/src/i18n/texts/axis/drive.ts").read_text("utf-8")
     pairs = re.findall(r"'problemTitle\.([a-z-]+)': \['([^']+)', '([^']+)'\]", source)
     assert ours <= set(TITLES)
     assert {kind: english for kind, english, _ in pairs} == TITLES

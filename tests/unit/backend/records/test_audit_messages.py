@@ -143,6 +143,6 @@ def test_a_broken_chain_says_why_in_both_languages(store: Store, audit: AuditLog
 
 
 def test_the_page_has_words_for_every_action() -> None:
-    source = (ROOT / "webui/src/i18n/texts/library.ts").read_text("utf-8")
+    source = (ROOT / "webui/src/i18n/texts/records/library.ts").read_text("utf-8")
     shown = set(re.findall(r"'audit\.action\.([^']+)'", source))
     assert set(get_args(Action)) <= shown

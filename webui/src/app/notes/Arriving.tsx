@@ -2,8 +2,8 @@ import { type ReactNode, useEffect, useState } from 'react'
 import { moment, outstanding } from '../../api/outstanding'
 import { useT } from '../../i18n'
 import { contents } from '../../live/store'
-import '../arriving.css'
-import type { Page } from '../router'
+import './arriving.css'
+import type { Page } from '../navigation/router'
 
 /** Looked at so often; a question that follows from an answer is asked within two looks. */
 const LOOK_MS = 30

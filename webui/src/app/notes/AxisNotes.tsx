@@ -2,9 +2,9 @@ import { useRef } from 'react'
 import type { AxisState } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { useAxisState } from '../../live/store'
-import { Icon } from '../../widgets/Icon'
-import { href, type Page } from '../router'
-import { listsFaults } from '../states'
+import { Icon } from '../../widgets/layout/Icon'
+import { href, type Page } from '../navigation/router'
+import { listsFaults } from '../navigation/states'
 
 /** What went wrong with an axis while its page is open: no answer, a fault. */
 export function AxisNotes({ drive, page }: { drive: string; page: Page }) {

@@ -2,8 +2,8 @@ import { VisuallyHidden } from '@mantine/core'
 import { useMemo, useSyncExternalStore } from 'react'
 import { useT } from '../../i18n'
 import { contents, subscribe, useDrives } from '../../live/store'
-import { Icon } from '../../widgets/Icon'
-import { href } from '../router'
+import { Icon } from '../../widgets/layout/Icon'
+import { href } from '../navigation/router'
 
 /** The way to a fault of an axis that is not the chosen one: on a phone nothing else reports it. */
 export function FaultElsewhere({ chosen }: { chosen: string | null }) {

@@ -1,5 +1,5 @@
 /** How far a page is scrolled, and what room a notice that went left above it; px. */
-export interface Settled {
+interface Settled {
   scrolled: number
   left: number
 }

@@ -6,7 +6,7 @@ import * as live from '../../live/live'
 import { dropNotice, useNotices, usePeople } from '../../live/people'
 import { useDrive, useDrives } from '../../live/store'
 import { clock } from '../../widgets/numbers/format'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { hasRight } from './session'
 
 const LOANS_MIN = [5, 15, 60]

@@ -3,9 +3,9 @@ import { type ReactNode, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Session } from '../../api/schema'
 import { useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 import { keep } from './session'
 
 /** The address of an invitation. */

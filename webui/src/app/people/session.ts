@@ -1,7 +1,7 @@
 import { api, ask, setCsrf } from '../../api/client'
 import type { Session } from '../../api/schema'
 import { publish, useStore } from '../../live/store'
-import * as browser from '../../widgets/kept'
+import * as browser from '../../widgets/browser/kept'
 
 /** Who this page is for; null until the server has said. */
 let session: Session | null = null

@@ -3,7 +3,7 @@ import { createPortal } from 'react-dom'
 import type { AxisStopInfo } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { useDrives, useStore } from '../../live/store'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { currentReport, dismissReport, stopEverything } from './stop'
 
 const GOOD_NEWS_MS = 6000

@@ -4,7 +4,7 @@ import * as live from '../../live/live'
 import { contents, publish, subscribe } from '../../live/store'
 
 /** What the last STOP reached. `null` answer: the server has not answered yet. */
-export interface StopReport {
+interface StopReport {
   at: number
   /** Number of the press on this page: an answer to an earlier one does not count for it. */
   press: number

@@ -1,6 +1,6 @@
 import type { AxisState, JobInfo } from '../../api/schema'
-import { keep, kept } from '../../widgets/kept'
-import type { AxisPage } from '../router'
+import { keep, kept } from '../../widgets/browser/kept'
+import type { AxisPage } from '../navigation/router'
 
 /** The steps of the guided tour, in order. */
 export const STEPS = ['look', 'jog', 'response', 'tune', 'fault', 'undo', 'end'] as const

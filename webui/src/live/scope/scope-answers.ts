@@ -1,10 +1,10 @@
 /** Answers of the scope that follow from its traces alone. */
 import { csvText } from './csv-text'
 import { columns, thinned } from './decimate'
-import type { stretch } from './measure'
+import type { stretch } from './analysis/measure'
 import type { Trace } from './ring'
 import type { Sweep } from './trigger'
-import type { Overlay, Questions } from '../worker-messages'
+import type { Overlay, Questions } from '../worker/worker-messages'
 
 /** These sweeps, oldest first, in times from their trigger. */
 export function overlays(sweeps: Sweep[], traces: Trace[], bins: number): Overlay[] {

@@ -1,12 +1,12 @@
 import type { ScopeStart } from '../../api/schema'
 import { decodeBlocks, type ScopeBlock } from './blocks'
 import { columns } from './decimate'
-import { MathsChannel } from './maths'
-import { measure, stretch } from './measure'
+import { MathsChannel } from './analysis/maths'
+import { measure, stretch } from './analysis/measure'
 import { Ring, Trace } from './ring'
 import { csv, overlays, xy } from './scope-answers'
 import { ScopeSweeps } from './scope-sweeps'
-import { EVEN, spectrogram, spectrum } from './spectrum'
+import { EVEN, spectrogram, spectrum } from './analysis/spectrum'
 import type {
   Losses,
   QuestionKind,
@@ -16,7 +16,7 @@ import type {
   ScopeTrigger,
   ScopeView,
   TriggerState,
-} from '../worker-messages'
+} from '../worker/worker-messages'
 
 /** Rows kept per channel: at 4 kHz 80 s, and 16 channels of it take 82 MB. */
 const GREATEST_ROWS = 320_000

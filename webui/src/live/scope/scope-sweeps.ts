@@ -1,6 +1,6 @@
 import type { Ring, Trace } from './ring'
 import { type Sweep, Trigger } from './trigger'
-import type { ScopeFrame, ScopeTrigger, TriggerState } from '../worker-messages'
+import type { ScopeFrame, ScopeTrigger, TriggerState } from '../worker/worker-messages'
 
 const MOST_SWEEPS = 50
 /** Traces that lag by more than this are not waited for when a single picture is complete. */

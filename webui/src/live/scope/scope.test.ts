@@ -6,7 +6,7 @@ import { columns, thinned } from './decimate'
 import { Ring, Trace } from './ring'
 import { ScopeStore } from './scope-store'
 import { hasBit, Trigger, type TriggerSettings } from './trigger'
-import type { ScopeConfig, ScopeTrigger, ScopeView } from '../worker-messages'
+import type { ScopeConfig, ScopeTrigger, ScopeView } from '../worker/worker-messages'
 
 /** A frame by hand, byte by byte, after the layout in backend/api/live/messages.py. */
 function frame(options: {

@@ -3,9 +3,9 @@ import { useRef, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { AuditVerdict } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 
 const ANCHOR = /^(\d{1,18}:[0-9a-f]{64})?$/
 

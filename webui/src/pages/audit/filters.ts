@@ -1,5 +1,5 @@
 import type { AuditEvent } from '../../api/schema'
-import { dayStart } from '../../widgets/days'
+import { dayStart } from '../../widgets/requests/days'
 
 export type AuditKind = AuditEvent['kind']
 

@@ -2,7 +2,7 @@ import { useCallback, useRef, useState } from 'react'
 import { api, ask, problemOf } from '../../api/client'
 import type { AuditEvent, AuditNames, AuditStatus, Problem } from '../../api/schema'
 import { useLink } from '../../live/store'
-import { useSearch } from '../../widgets/useSearch'
+import { useSearch } from '../../widgets/requests/useSearch'
 import { type AuditFilters, auditQuery } from './filters'
 
 /** Entries that fit, newest first; `older` adds the ones before them. */

@@ -1,5 +1,5 @@
 import { useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
+import { Panel } from '../../widgets/layout/Panel'
 
 const TOPICS = ['serial', 'serialPermission', 'ethercat', 'can', 'nothing'] as const
 

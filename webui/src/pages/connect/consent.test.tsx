@@ -4,7 +4,7 @@ import { screen } from '@testing-library/react'
 import { userEvent } from '@testing-library/user-event'
 import { beforeEach, expect, it } from 'vitest'
 import type { DriveSummary, MissingPort, SegmentStation } from '../../api/schema'
-import { MissingPorts } from './MissingPorts'
+import { MissingPorts } from './bench/MissingPorts'
 import { StationPanel } from './segment/StationPanel'
 
 const station = (part: Partial<SegmentStation>) =>

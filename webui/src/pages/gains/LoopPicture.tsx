@@ -1,7 +1,7 @@
-import '../../widgets/functions.css'
+import '../../widgets/layout/functions.css'
 import type { GainBlock } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ArrowTip, DrawnButton } from '../../widgets/drawn'
+import { ArrowTip, DrawnButton } from '../../widgets/layout/drawn'
 
 type Block = GainBlock['block']
 

@@ -5,11 +5,11 @@ import type { ForcingInfo, MessageInfo } from '../../api/schema'
 import { plainResult } from '../../api/results'
 import { useSay as useMessages, useT } from '../../i18n'
 import { useJob } from '../../live/store'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
-import { useAction } from '../../widgets/useAction'
+import { useAction } from '../../widgets/requests/useAction'
 
 /** The server lets go five seconds after the last sign of life. */
 const ALIVE_MS = 1000

@@ -1,15 +1,15 @@
-import '../../widgets/functions.css'
+import '../../widgets/layout/functions.css'
 import { Button, Modal, NativeSelect } from '@mantine/core'
 import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { ParameterValue, TerminalBits, TerminalInfo } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setReadings, useReadings } from '../../live/store'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useRows } from '../../widgets/profile-text/rows'
 import { useSay } from '../../widgets/profile-text/texts'
-import { useAction } from '../../widgets/useAction'
+import { useAction } from '../../widgets/requests/useAction'
 import { polarityName, twins } from './terminals'
 
 /** State of a terminal in the newest reading of the object that shows it. */

@@ -1,9 +1,9 @@
 import { known, useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
+import { Panel } from '../../widgets/layout/Panel'
 import { ParameterFields } from '../../widgets/parameters/ParameterFields'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useSay } from '../../widgets/profile-text/texts'
-import { useFunctions } from '../../widgets/useFunctions'
+import { useFunctions } from '../../widgets/drive/useFunctions'
 
 /** How the axis stops, its range as a rotary axis, impedance: what the drive has of it. */
 export function SettingsPanel({ drive }: { drive: string }) {

@@ -7,10 +7,10 @@ import { setJob, useAxisState } from '../../live/store'
 import { figure } from '../../widgets/numbers/format'
 import { JobNote, useJobEnd } from '../../widgets/jobs/JobNote'
 import { NumberField } from '../../widgets/numbers/NumberField'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { StartButton } from '../../widgets/jobs/StartButton'
-import { useAction } from '../../widgets/useAction'
+import { useAction } from '../../widgets/requests/useAction'
 import { useWrong } from '../../widgets/numbers/useWrong'
 
 /** Scales with their origins; folded while they are certain, with ways to teach them. */

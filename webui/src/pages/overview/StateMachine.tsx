@@ -1,6 +1,6 @@
 import { Fragment } from 'react'
 import { known, useLanguage, useT } from '../../i18n'
-import { ArrowTip, DrawnButton } from '../../widgets/drawn'
+import { ArrowTip, DrawnButton } from '../../widgets/layout/drawn'
 
 /** Boxes of the picture: centre, in the units of the drawing. After CiA 402-2 figure 6. */
 const BOXES: { state: string; x: number; y: number }[] = [

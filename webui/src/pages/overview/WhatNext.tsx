@@ -1,8 +1,8 @@
-import { href } from '../../app/router'
-import { useCanTune } from '../../app/useCanTune'
-import { useHasIo } from '../../app/useHasIo'
+import { href } from '../../app/navigation/router'
+import { useCanTune } from '../../app/navigation/useCanTune'
+import { useHasIo } from '../../app/navigation/useHasIo'
 import { useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
+import { Panel } from '../../widgets/layout/Panel'
 
 /** The way from a drive that was just connected to a tuned and documented axis, page by page. */
 const STEPS = [

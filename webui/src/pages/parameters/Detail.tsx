@@ -5,8 +5,8 @@ import type { ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
 import { setReadings, useReading } from '../../live/store'
 import { dateTime, hexadecimal, isWhole, toValue } from '../../widgets/numbers/format'
-import { Icon } from '../../widgets/Icon'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { Icon } from '../../widgets/layout/Icon'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import {
   type BitField,
   bitFields,
@@ -16,9 +16,9 @@ import {
 } from '../../widgets/numbers/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
-import { Said } from '../../widgets/Said'
-import { useAction } from '../../widgets/useAction'
-import { setRecord, useRecord } from '../../widgets/useFunctions'
+import { Said } from '../../widgets/messages/Said'
+import { useAction } from '../../widgets/requests/useAction'
+import { setRecord, useRecord } from '../../widgets/drive/useFunctions'
 import { setEdit, useEdits, writeEdits } from './edits'
 import { editable } from './Grid'
 import { editText, pendingKey, range, readingText } from './GridRow'

@@ -3,7 +3,7 @@ import type { ParameterRow, ParameterValue, Problem } from '../../api/schema'
 import { useSay, useT } from '../../i18n'
 import { useReading } from '../../live/store'
 import { hexadecimal, isText, isWhole, shown, toValue } from '../../widgets/numbers/format'
-import { Icon } from '../../widgets/Icon'
+import { Icon } from '../../widgets/layout/Icon'
 import { parseTyped } from '../../widgets/numbers/parse'
 import { Original } from '../../widgets/profile-text/ProfileText'
 import type { ShownRow } from '../../widgets/profile-text/shown-row'
@@ -292,7 +292,7 @@ function Marks({ row, edit, problem, differs, reading }: Props & { reading: Para
 }
 
 const EFFECTIVE = ['now', 'stopped', 'reenable', 'write_settings', 'power_cycle'] as const
-export type Effective = (typeof EFFECTIVE)[number]
+type Effective = (typeof EFFECTIVE)[number]
 
 /** The known words of when a value acts; anything newer reads as "not yet". */
 export function pendingKey(text: string): Effective | 'later' {

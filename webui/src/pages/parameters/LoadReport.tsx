@@ -6,10 +6,10 @@ import { plainResult } from '../../api/results'
 import { useT } from '../../i18n'
 import { setJob, useJob } from '../../live/store'
 import { JobNote, useJobEnd } from '../../widgets/jobs/JobNote'
-import { Said } from '../../widgets/Said'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import type { Raw } from '../../widgets/types'
-import { useAction } from '../../widgets/useAction'
+import { Said } from '../../widgets/messages/Said'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import type { Raw } from '../../widgets/parameters/types'
+import { useAction } from '../../widgets/requests/useAction'
 
 interface Row {
   key: string

@@ -4,9 +4,9 @@ import { api, ask } from '../../api/client'
 import type { MotionClass as Info, MotionClassRequest } from '../../api/schema'
 import { hasRight } from '../../app/people/session'
 import { useT } from '../../i18n'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { useSay } from '../../widgets/profile-text/texts'
-import { useAction } from '../../widgets/useAction'
+import { useAction } from '../../widgets/requests/useAction'
 
 const CLASSES = ['none', 'at_enable', 'energises'] as const
 

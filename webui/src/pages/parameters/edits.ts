@@ -3,7 +3,7 @@ import type { Problem, WriteResult } from '../../api/schema'
 import { contents, publish, setReadings, useStore, whenGone } from '../../live/store'
 import { toValue } from '../../widgets/numbers/format'
 import { parseTyped } from '../../widgets/numbers/parse'
-import type { ParameterInfo } from '../../widgets/types'
+import type { ParameterInfo } from '../../widgets/parameters/types'
 
 /** A typed value that is not in the drive. It survives leaving the page, not closing it. */
 export interface Edit {

@@ -13,7 +13,7 @@ export const FILTERS = [
 ] as const
 export type Filter = (typeof FILTERS)[number]
 
-export interface Wanted {
+interface Wanted {
   filter: Filter
   group: string | null
   search: string

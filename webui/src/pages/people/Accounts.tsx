@@ -4,9 +4,9 @@ import { api, ask } from '../../api/client'
 import type { AccountInfo, Role } from '../../api/schema'
 import { NewPassword } from '../../app/people/LogInForms'
 import { useT } from '../../i18n'
-import { Panel } from '../../widgets/Panel'
-import { ProblemNote } from '../../widgets/ProblemNote'
-import { useAction } from '../../widgets/useAction'
+import { Panel } from '../../widgets/layout/Panel'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
+import { useAction } from '../../widgets/requests/useAction'
 
 const ROLES: Role[] = ['viewer', 'operator', 'administrator']
 

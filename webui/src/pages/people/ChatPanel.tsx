@@ -6,7 +6,7 @@ import * as live from '../../live/live'
 import { addChat, useChat } from '../../live/people'
 import { useLink } from '../../live/store'
 import { clock } from '../../widgets/numbers/format'
-import { Panel } from '../../widgets/Panel'
+import { Panel } from '../../widgets/layout/Panel'
 
 /** Lines for everybody on the station. */
 export function ChatPanel() {

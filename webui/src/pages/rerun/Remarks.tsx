@@ -3,8 +3,8 @@ import { useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { RecordingInfo } from '../../api/schema'
 import { useT } from '../../i18n'
-import { ChangedMeanwhile } from '../../widgets/ChangedMeanwhile'
-import { useRemarks } from '../../widgets/useRemarks'
+import { ChangedMeanwhile } from '../../widgets/messages/ChangedMeanwhile'
+import { useRemarks } from '../../widgets/requests/useRemarks'
 
 /** Notes, tags, and whether a stored recording is kept for ever. */
 export function Remarks({

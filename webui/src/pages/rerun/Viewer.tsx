@@ -1,7 +1,7 @@
 import { useComputedColorScheme } from '@mantine/core'
 import { useEffect, useRef } from 'react'
 import { useT } from '../../i18n'
-import { stopByEscapeIn } from '../../widgets/frame-stop'
+import { stopByEscapeIn } from '../../app/stop/frame-stop'
 import { LOADING, size, useViewer, viewerUrl } from './viewer'
 
 /** rerun's own viewer in a frame of our origin; `recording` null shows what happens now. */

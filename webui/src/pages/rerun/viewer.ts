@@ -2,7 +2,7 @@ import { useEffect, useState } from 'react'
 import { API_ROOT } from '../../api/client'
 
 /** What the viewer's frame shows (backend/records/recording/viewer/viewer.js). */
-export interface ViewerState {
+interface ViewerState {
   phase: 'loading' | 'started' | 'live' | 'stored' | 'lost' | 'broken'
   fraction: number
   bytes: number

@@ -5,7 +5,7 @@ import { useLink } from '../../live/store'
 import { asSweep } from './results'
 
 /** Kind of what came from another program; compares with measurements of the mechanics. */
-export const IMPORTED = 'imported-response'
+const IMPORTED = 'imported-response'
 export const comparable = (one: string | undefined, other: string): boolean =>
   one === other ||
   (one === IMPORTED && other === 'sweep-mechanics') ||

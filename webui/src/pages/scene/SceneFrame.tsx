@@ -3,7 +3,7 @@ import { useRef, useState } from 'react'
 import { API_ROOT } from '../../api/client'
 import { useT } from '../../i18n'
 import { useDrives } from '../../live/store'
-import { stopByEscapeIn } from '../../widgets/frame-stop'
+import { stopByEscapeIn } from '../../app/stop/frame-stop'
 import { cameraFor, written } from './camera'
 import { SceneStates } from './SceneStates'
 

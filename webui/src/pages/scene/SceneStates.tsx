@@ -1,7 +1,7 @@
-import { stateLook, stateSign } from '../../app/states'
+import { stateLook, stateSign } from '../../app/navigation/states'
 import { useT } from '../../i18n'
 import { useAxisStates, useDrives } from '../../live/store'
-import { StateName } from '../../widgets/StateName'
+import { StateName } from '../../widgets/drive/StateName'
 
 /**
  * The states of the axes beneath the scene, in the page's language: viser has one label for all who

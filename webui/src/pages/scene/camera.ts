@@ -8,7 +8,7 @@ const FARTHEST = 2.5
 /** Distance from which one axis is seen whole in a usual window. */
 const CLEAR = 1.4
 
-export interface Camera {
+interface Camera {
   position: Point
   lookAt: Point
 }

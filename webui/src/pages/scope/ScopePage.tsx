@@ -1,25 +1,25 @@
 import { SegmentedControl, useComputedColorScheme } from '@mantine/core'
 import { useCallback, useEffect, useRef, useState } from 'react'
-import { useRoute } from '../../app/router'
+import { useRoute } from '../../app/navigation/router'
 import type { ScopeSetup } from '../../api/schema'
 import { useT } from '../../i18n'
 import * as live from '../../live/live'
 import { contents, useDrives, useLink } from '../../live/store'
-import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
+import type { ScopeFrame, ScopeView } from '../../live/worker/worker-messages'
 import { type PlotHandle, TimePlot } from '../../plots/TimePlot'
-import type { Span } from '../../plots/yscale'
-import { ProblemNote } from '../../widgets/ProblemNote'
+import type { Span } from '../../plots/geometry/yscale'
+import { ProblemNote } from '../../widgets/messages/ProblemNote'
 import { useRows } from '../../widgets/profile-text/rows'
-import { offerDownload } from '../files/sets'
-import { ChannelPicker } from './ChannelPicker'
-import { TRACE_COLORS, usualChannels } from './channels'
-import { Cursors } from './Cursors'
-import { KeepPanel } from './KeepPanel'
-import { MathsPanel } from './MathsPanel'
-import { Measurements } from './Measurements'
+import { offerDownload } from '../../widgets/browser/download'
+import { ChannelPicker } from './setup/ChannelPicker'
+import { TRACE_COLORS, usualChannels } from './setup/channels'
+import { Cursors } from './analysis/Cursors'
+import { KeepPanel } from './recording/KeepPanel'
+import { MathsPanel } from './analysis/MathsPanel'
+import { Measurements } from './analysis/Measurements'
 import type { PanelProps } from './panels'
-import { RangePanel } from './RangePanel'
-import { referenceOverlays, sweepOverlays, useReferences } from './references'
+import { RangePanel } from './analysis/RangePanel'
+import { referenceOverlays, sweepOverlays, useReferences } from './recording/references'
 import './scope.css'
 import {
   needsDrive,
@@ -30,11 +30,11 @@ import {
   withoutGoneAxis,
   withChannels,
   withRange,
-} from './setup'
-import { SpectrogramPanel } from './SpectrogramPanel'
-import { SpectrumPanel } from './SpectrumPanel'
-import { Toolbar } from './Toolbar'
-import { TriggerPanel } from './TriggerPanel'
+} from './setup/setup'
+import { SpectrogramPanel } from './analysis/SpectrogramPanel'
+import { SpectrumPanel } from './analysis/SpectrumPanel'
+import { Toolbar } from './setup/Toolbar'
+import { TriggerPanel } from './setup/TriggerPanel'
 import {
   type ChangeSetup,
   useFrames,
@@ -44,8 +44,8 @@ import {
   useSetup,
   useTrigger,
 } from './useScope'
-import { useShown } from './useShown'
-import { XyPanel } from './XyPanel'
+import { useShown } from './setup/useShown'
+import { XyPanel } from './analysis/XyPanel'
 
 const TABLE_MS = 250
 const FRAME_MS = 40

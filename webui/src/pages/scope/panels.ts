@@ -1,4 +1,4 @@
-import type { Shown } from './setup'
+import type { Shown } from './setup/setup'
 
 /** What a panel beneath the plot needs of the page. */
 export interface PanelProps {

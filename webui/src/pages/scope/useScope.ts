@@ -3,9 +3,9 @@ import { api, ask, problemOf } from '../../api/client'
 import type { NamedSetup, Problem, ScopeSetup, SnapshotInfo } from '../../api/schema'
 import * as live from '../../live/live'
 import { contents, useLink, useStore } from '../../live/store'
-import type { ScopeFrame, ScopeView } from '../../live/worker-messages'
+import type { ScopeFrame, ScopeView } from '../../live/worker/worker-messages'
 import { useSayOf } from '../../widgets/profile-text/texts'
-import { configOf, EMPTY, type Infos, storedSetup, storeSetup, triggerOf } from './setup'
+import { configOf, EMPTY, type Infos, storedSetup, storeSetup, triggerOf } from './setup/setup'
 
 /** Another set-up, or what becomes of the present one. */
 export type ChangeSetup = (next: ScopeSetup | ((now: ScopeSetup) => ScopeSetup)) => void

@@ -1,14 +1,14 @@
-import '../../widgets/functions.css'
-import { href } from '../../app/router'
+import '../../widgets/layout/functions.css'
+import { href } from '../../app/navigation/router'
 import type { BrakeTiming, IoInfo } from '../../api/schema'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
 import { useReading } from '../../live/store'
-import { Panel } from '../../widgets/Panel'
+import { Panel } from '../../widgets/layout/Panel'
 import { ParameterFields } from '../../widgets/parameters/ParameterFields'
 import { ProfileText } from '../../widgets/profile-text/ProfileText'
 import { useRows } from '../../widgets/profile-text/rows'
-import { useFetched } from '../../widgets/useFunctions'
+import { useFetched } from '../../widgets/drive/useFunctions'
 import { brakeCourse } from './brake'
 
 /** Settings of the holding brake next to the course that follows from them. */

@@ -5,7 +5,7 @@ import { userEvent } from '@testing-library/user-event'
 import { beforeEach, expect, it } from 'vitest'
 import type { AxisRecordInfo, GearPlanInfo, Mechanics } from '../../api/schema'
 import { contents } from '../../live/store'
-import { setRecord } from '../../widgets/useFunctions'
+import { setRecord } from '../../widgets/drive/useFunctions'
 import { GearPanel } from './GearPanel'
 import { START, toMechanics } from './mechanics'
 

@@ -1,5 +1,5 @@
 /** Times of a holding brake, in ms and rpm; null where the drive has no such setting. */
-export interface BrakeTimes {
+interface BrakeTimes {
   openDelay: number | null
   commandDelay: number | null
   closeDelay: number | null
@@ -13,7 +13,7 @@ export interface Trace {
   points: [number, number][]
 }
 
-export interface Course {
+interface Course {
   traces: Trace[]
   /** Spans to write a time at: which trace, from, to. */
   spans: { trace: Trace['name']; from: number; to: number; text: string }[]

@@ -1,8 +1,8 @@
 import { useEffect, useState } from 'react'
 import { api, ask } from '../../api/client'
 import type { Mechanics } from '../../api/schema'
-import { useAction } from '../../widgets/useAction'
-import { setRecord, useRecord } from '../../widgets/useFunctions'
+import { useAction } from '../../widgets/requests/useAction'
+import { setRecord, useRecord } from '../../widgets/drive/useFunctions'
 import { complete, type Form, formOf, START, toMechanics } from './mechanics'
 
 /** What is typed of an axis' mechanics, beginning with what is kept, and keeping it. */

@@ -1,6 +1,6 @@
 import type { ActiveFault } from '../../api/schema'
 import { useT } from '../../i18n'
-import { Icon } from '../Icon'
+import { Icon } from '../layout/Icon'
 import { ParameterText } from '../parameters/ParameterText'
 import { OriginalSwitch, ProfileText } from '../profile-text/ProfileText'
 

@@ -2,8 +2,8 @@ import { Button } from '@mantine/core'
 import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
 import { setState } from '../../live/store'
-import { ProblemNote } from '../ProblemNote'
-import { useAction } from '../useAction'
+import { ProblemNote } from '../messages/ProblemNote'
+import { useAction } from '../requests/useAction'
 
 /** Resets the drive's faults; what it answers is shown as its new state. */
 export function useFaultReset(drive: string) {

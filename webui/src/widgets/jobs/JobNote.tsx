@@ -6,8 +6,8 @@ import { type Say, type T, useSay, useT } from '../../i18n'
 import { serverNow } from '../../live/server-clock'
 import { setJob, useJob } from '../../live/store'
 import { clock, duration } from '../numbers/format'
-import { ProblemNote } from '../ProblemNote'
-import { useAction } from '../useAction'
+import { ProblemNote } from '../messages/ProblemNote'
+import { useAction } from '../requests/useAction'
 
 /** How long the good end of a job is reported. */
 const DONE_MS = 6000

@@ -12,7 +12,7 @@ export function useObstacle(drive: string): string | null {
   return obstacleOf(t, say, open, state, job ? say.title(job) : '…')
 }
 
-export function obstacleOf(
+function obstacleOf(
   t: T,
   say: Say,
   open: boolean,

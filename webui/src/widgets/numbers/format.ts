@@ -1,4 +1,4 @@
-import type { ParameterInfo, Raw } from '../types'
+import type { ParameterInfo, Raw } from '../parameters/types'
 
 /** Decimals that a measured quantity is shown with, so that digits do not dance. */
 const DECIMALS: Record<string, number> = {

@@ -1,7 +1,7 @@
 import { expect, it } from 'vitest'
 import { faultOf, toNumber } from './number-text'
 import { parseTyped } from './parse'
-import type { ParameterInfo } from '../types'
+import type { ParameterInfo } from '../parameters/types'
 
 it('takes a point or a comma, and no number that cannot be sent', () => {
   expect(['1.5', '1,5', ' −2 ', '.5', '1e3'].map(toNumber)).toEqual([1.5, 1.5, -2, 0.5, 1000])

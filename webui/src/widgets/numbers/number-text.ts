@@ -1,5 +1,5 @@
 /** What a typed number must be. */
-export interface Bounds {
+interface Bounds {
   min?: number | undefined
   max?: number | undefined
   /** Exclusive lower limit. */

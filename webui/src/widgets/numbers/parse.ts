@@ -1,5 +1,5 @@
 import { isInteger, isText, toValue } from './format'
-import type { ParameterInfo, Raw } from '../types'
+import type { ParameterInfo, Raw } from '../parameters/types'
 
 /** A typed text: what would be sent, or why it cannot be. */
 export type Typed =

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest'
 import type { ParameterRow } from '../../api/schema'
-import { parseStations } from '../../pages/connect/stations'
+import { parseStations } from '../../pages/connect/scan/stations'
 import { groups, isChanged, matches, select } from '../../pages/parameters/filters'
 import { clock, dateTime, duration, figure, hexadecimal, quantity, shown, toValue } from './format'
 import { bitFields, getField, parseTyped, setField } from './parse'

@@ -1,4 +1,4 @@
-import '../functions.css'
+import '../layout/functions.css'
 import { Button } from '@mantine/core'
 import { useEffect } from 'react'
 import { api, ask } from '../../api/client'
@@ -8,13 +8,13 @@ import { Editor } from '../../pages/parameters/Detail'
 import { setEdit, useEdits, writeEdits } from '../../pages/parameters/edits'
 import { editable } from '../../pages/parameters/Grid'
 import { readingText } from '../../pages/parameters/GridRow'
-import { Said } from '../Said'
-import { ProblemNote } from '../ProblemNote'
+import { Said } from '../messages/Said'
+import { ProblemNote } from '../messages/ProblemNote'
 import { Original } from '../profile-text/ProfileText'
 import { useRows } from '../profile-text/rows'
 import type { ShownRow } from '../profile-text/shown-row'
-import { together } from '../together'
-import { useAction } from '../useAction'
+import { together } from '../requests/together'
+import { useAction } from '../requests/useAction'
 
 /** Rows of these keys that a connected port can carry, in the order of the keys. */
 export function useReachable(drive: string, keys: readonly string[]): ShownRow[] {

@@ -1,5 +1,5 @@
 import type { ParameterRow } from '../../api/schema'
-import { href } from '../../app/router'
+import { href } from '../../app/navigation/router'
 import { namedParameters } from './named-parameters'
 import { ProfileText } from '../profile-text/ProfileText'
 import { useRows } from '../profile-text/rows'

@@ -4,8 +4,8 @@ import { api, ask } from '../../api/client'
 import { useT } from '../../i18n'
 import { setJob, useDrive } from '../../live/store'
 import { JobNote } from '../jobs/JobNote'
-import { ProblemNote } from '../ProblemNote'
-import { useAction } from '../useAction'
+import { ProblemNote } from '../messages/ProblemNote'
+import { useAction } from '../requests/useAction'
 
 /** What a motion changed and could not restore, with one press to do so once the drive answers. */
 export function PendingRestoresNote({ drive }: { drive: string }) {

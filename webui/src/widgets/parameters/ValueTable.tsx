@@ -1,9 +1,9 @@
 import { Checkbox } from '@mantine/core'
 import type { MessageInfo, ParameterRow } from '../../api/schema'
 import { useT } from '../../i18n'
-import { Said } from '../Said'
+import { Said } from '../messages/Said'
 import { shown } from '../numbers/format'
-import type { Raw } from '../types'
+import type { Raw } from './types'
 
 /** What every comparison reports of a parameter, whichever sides it has. */
 interface Compared {

@@ -3,7 +3,7 @@ import { api, ask } from '../../api/client'
 import { textsCame, useLanguage } from '../../i18n'
 import { fetchProfilesBy, keepProfile } from '../../i18n/message'
 import { useDrive, useDrives, useLink } from '../../live/store'
-import { keep, kept } from '../kept'
+import { keep, kept } from '../browser/kept'
 
 /** English text of a profile to its translation; null until the server has said it. */
 export type Texts = ReadonlyMap<string, string> | null

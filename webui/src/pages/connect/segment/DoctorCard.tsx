@@ -3,8 +3,8 @@ import { useState } from 'react'
 import { api, ask } from '../../../api/client'
 import type { DoctorFact, StationDiagnosis } from '../../../api/schema'
 import { useLanguage, useT, type T } from '../../../i18n'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { TrialList } from './TrialList'
 
 /** Why stations of a bus are not in Operational: causes with evidence, the likeliest first. */

@@ -3,8 +3,8 @@ import { useState } from 'react'
 import { API_ROOT, api, ask } from '../../../api/client'
 import type { EepromPlan, SegmentStation } from '../../../api/schema'
 import { useT } from '../../../i18n'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 type What = 'restore' | 'identity'
 

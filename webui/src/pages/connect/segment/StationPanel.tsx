@@ -5,9 +5,9 @@ import type { SegmentStation } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { setJob } from '../../../live/store'
 import { JobNote } from '../../../widgets/jobs/JobNote'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { Said } from '../../../widgets/Said'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { Said } from '../../../widgets/messages/Said'
+import { useAction } from '../../../widgets/requests/useAction'
 import { Eeprom } from './Eeprom'
 
 /** One slave: identity, state, clock, ports, alias, firmware. */

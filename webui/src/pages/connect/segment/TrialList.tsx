@@ -5,8 +5,8 @@ import type { DoctorTrial, StationDiagnosis, TrialResult } from '../../../api/sc
 import { useSay, useT } from '../../../i18n'
 import { setJob } from '../../../live/store'
 import { JobNote, useJobEnd } from '../../../widgets/jobs/JobNote'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** Settings of the bring-up that may be the cause: try one, see the state, keep or undo it. */
 export function TrialList({

@@ -1,7 +1,7 @@
 import type { SegmentStation } from '../../../api/schema'
 
 /** What a cable is like: whole, whole with counted errors, broken, or behind a broken one. */
-export type CableState = 'good' | 'errors' | 'broken' | 'beyond'
+type CableState = 'good' | 'errors' | 'broken' | 'beyond'
 
 /** A station in the picture: column from the computer, row of its branch, cable before it. */
 export interface Place {

@@ -3,10 +3,10 @@ import { useState } from 'react'
 import { api, ask } from '../../../api/client'
 import { useT } from '../../../i18n'
 import { dateTime, shown, toValue } from '../../../widgets/numbers/format'
-import { ProblemNote } from '../../../widgets/ProblemNote'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
 import { useRows } from '../../../widgets/profile-text/rows'
-import type { Raw } from '../../../widgets/types'
-import { useAction } from '../../../widgets/useAction'
+import type { Raw } from '../../../widgets/parameters/types'
+import { useAction } from '../../../widgets/requests/useAction'
 import { changedSince, forget, noteForeign, noteUndone, useChanges, useForeign } from './undo'
 
 /** The newest change to an axis, with the way back. */

@@ -1,6 +1,6 @@
 import { api, ask } from '../../../api/client'
 import type { GainInfo, GainValues } from '../../../api/schema'
-import { useFetched } from '../../../widgets/useFunctions'
+import { useFetched } from '../../../widgets/drive/useFunctions'
 
 /** Loop gains of a drive, read from it. */
 export function useGains(drive: string) {

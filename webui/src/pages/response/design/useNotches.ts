@@ -1,8 +1,8 @@
 import { useRef, useState } from 'react'
 import { api, ask } from '../../../api/client'
 import type { NotchPreviewInfo, NotchSlotInfo } from '../../../api/schema'
-import { useAnswer } from '../../../widgets/useAnswer'
-import { useFetched } from '../../../widgets/useFunctions'
+import { useAnswer } from '../../../widgets/requests/useAnswer'
+import { useFetched } from '../../../widgets/drive/useFunctions'
 import type { NotchShape } from '../results'
 
 const SETTLE_MS = 250

@@ -1,6 +1,6 @@
 import { api, ask } from '../../../api/client'
 import type { GainValues, PredictionInfo } from '../../../api/schema'
-import { useAnswer } from '../../../widgets/useAnswer'
+import { useAnswer } from '../../../widgets/requests/useAnswer'
 import type { NotchShape } from '../results'
 
 const SETTLE_MS = 300

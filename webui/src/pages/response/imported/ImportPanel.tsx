@@ -4,13 +4,13 @@ import { api, ask } from '../../../api/client'
 import type { RecordingPreview } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { figure } from '../../../widgets/numbers/format'
-import { Icon } from '../../../widgets/Icon'
+import { Icon } from '../../../widgets/layout/Icon'
 import { NumberField } from '../../../widgets/numbers/NumberField'
-import { Panel } from '../../../widgets/Panel'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { Panel } from '../../../widgets/layout/Panel'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { useWrong, type Wrong } from '../../../widgets/numbers/useWrong'
-import { TRACE_COLORS } from '../../scope/channels'
+import { TRACE_COLORS } from '../../scope/setup/channels'
 import {
   guessed,
   INPUT_UNITS,

@@ -1,8 +1,8 @@
 import { useEffect, useRef } from 'react'
 import uPlot from 'uplot'
 import 'uplot/dist/uPlot.min.css'
-import type { PlotName } from '../../../live/scope/cursors'
-import { axisLook } from '../../../plots/axis'
+import type { PlotName } from '../../../live/scope/analysis/cursors'
+import { axisLook } from '../../../plots/geometry/axis'
 import { sharedCursor } from '../../../plots/shared-cursor'
 import { figure } from '../../../widgets/numbers/format'
 

@@ -3,7 +3,7 @@ import { useEffect, useState } from 'react'
 import { useT } from '../../../i18n'
 import { useAxisState, useDrive } from '../../../live/store'
 import { NumberField } from '../../../widgets/numbers/NumberField'
-import { useRemembered } from '../../motion/remembered'
+import { useRemembered } from '../../../widgets/browser/remembered'
 
 /** The motion envelope of every measurement; `null` while a field is not filled in. */
 export interface Limits {

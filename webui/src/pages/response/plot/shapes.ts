@@ -1,7 +1,7 @@
 import type { Sweep } from '../results'
 
 /** What a measured response of the mechanics lets one say about the machine. */
-export interface Judgement {
+interface Judgement {
   /** Load class by the first antiresonance; see docs/tuning.md. Null where there is none. */
   load: 'stiff' | 'medium' | 'compliant' | null
   /** Inertia behind the first soft part against what is before it: (f_r/f_a)² − 1. */
@@ -10,7 +10,7 @@ export interface Judgement {
 }
 
 /** Something to look at on the machine before any filter is set. */
-export type Hint = 'noise' | 'saturated' | 'moved' | 'wide' | 'low' | 'many' | 'untrusted'
+type Hint = 'noise' | 'saturated' | 'moved' | 'wide' | 'low' | 'many' | 'untrusted'
 
 const COMPLIANT_HZ = 80
 const MEDIUM_HZ = 300

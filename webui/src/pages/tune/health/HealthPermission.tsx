@@ -9,8 +9,8 @@ import { useLink } from '../../../live/store'
 import { dateTime } from '../../../widgets/numbers/format'
 import { useJobEnd } from '../../../widgets/jobs/JobNote'
 import { NumberField } from '../../../widgets/numbers/NumberField'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 
 /** Monday first, as the schedule counts them. */
 const DAYS = [0, 1, 2, 3, 4, 5, 6]

@@ -4,7 +4,7 @@ import type { HealthRunInfo } from '../../../api/schema'
 import { useT } from '../../../i18n'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
 import { dateTime, figure } from '../../../widgets/numbers/format'
-import { useCurveColors } from '../tools/Answer'
+import { useCurveColors } from '../tools/form/Answer'
 import { type Series, seriesOf } from './health'
 
 const UNITS: Record<Series['quantity'], string> = {

@@ -3,8 +3,8 @@ import { useState } from 'react'
 import { api, ask } from '../../../api/client'
 import type { AxisHealth } from '../../../api/schema'
 import { useSay, useT } from '../../../i18n'
-import { ProblemNote } from '../../../widgets/ProblemNote'
-import { useAction } from '../../../widgets/useAction'
+import { ProblemNote } from '../../../widgets/messages/ProblemNote'
+import { useAction } from '../../../widgets/requests/useAction'
 import { LEAST_ROUNDS, signable, toneOf } from './health'
 
 /** Each quantity against the baseline, what has changed first, with the next step. */

@@ -2,10 +2,10 @@ import { useMemo } from 'react'
 import { resultOf } from '../../../api/results'
 import type { BrakeResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
-import { Notes, useCurveColors, ValuesTable } from './Answer'
-import type { ShownNote, ShownRow, Text } from './model/shown'
-import { engineering } from '../steps'
-import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './ToolPanel'
+import { Notes, useCurveColors, ValuesTable } from './form/Answer'
+import type { ShownNote, ShownRow, Text } from './form/shown'
+import { engineering } from '../steps/steps'
+import { type Measured, MeasuredStart, ToolPanel, useToolRun } from './form/ToolPanel'
 
 /** What a person states about one test; cleared after it. */
 const STATED = ['brake_supply_cut', 'nothing_hangs', 'load_supported'] as const

@@ -2,10 +2,10 @@ import { useMemo } from 'react'
 import { resultOf } from '../../../api/results'
 import type { FirstPowerResult } from '../../../api/schema'
 import { CurvesPlot } from '../../../plots/CurvesPlot'
-import { useCurveColors } from './Answer'
-import type { Text } from './model/shown'
-import { amount } from '../steps'
-import { type Measured, ToolPanel, ToolStart, useToolRun } from './ToolPanel'
+import { useCurveColors } from './form/Answer'
+import type { Text } from './form/shown'
+import { amount } from '../steps/steps'
+import { type Measured, ToolPanel, ToolStart, useToolRun } from './form/ToolPanel'
 
 /** What a person states about one run; cleared after it. */
 const STATED = ['nothing_hangs', 'load_supported'] as const
