@@ -2,7 +2,7 @@ import type { DwellResult, VibrationResult } from '../../../../api/schema'
 import type { Ends, ShownNote, ShownRow, ShownTable, Text } from './shown'
 import { engineering } from '../../steps'
 
-/** As `backend/tools/vibration/texts.py` and `backend/tools/dwell/texts.py` have them. */
+/** As `backend/tools/watching/vibration/texts.py` and `backend/tools/moving/dwell/texts.py` have them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
   resonance: 'warn',
   fixed_frequency: 'warn',
