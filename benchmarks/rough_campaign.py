@@ -36,9 +36,9 @@ from backend.foundation.work.jobs import Progress
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
 from backend.tools.mechanics.inertia.run import inertia
 from backend.tools.tuning.autotune import apply, present
-from backend.tools.tuning.autotune import verify as verification
 from backend.tools.tuning.autotune.run import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.tuning.autotune.verify import Verified
+from backend.tools.tuning.autotune.verification import verify as verification
+from backend.tools.tuning.autotune.verification.verify import Verified
 from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings
 from backend.tools.tuning.sweep.run import sweep
 from benchmarks._rough_cases import CLASSES, Case, case_of

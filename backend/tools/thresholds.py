@@ -39,7 +39,7 @@ class autotune_apply:
 
 
 class autotune_candidates:
-    """`tuning/autotune/candidates.py`."""
+    """`tuning/autotune/design/candidates.py`."""
 
     VERIFIABLE = 0.2
     """[ratio] A loop can be verified up to this share of the sample rate, so none is designed above
@@ -56,7 +56,7 @@ class autotune_candidates:
 
 
 class autotune_gain_steps:
-    """`tuning/autotune/gain_steps.py`."""
+    """`tuning/autotune/verification/gain_steps.py`."""
 
     STEP_DB = 2.5
     """[dB] Gains are raised in steps of this many dB, and the last one to what is asked for.
@@ -99,7 +99,7 @@ class autotune_gain_steps:
 
 
 class autotune_gains:
-    """`tuning/autotune/gains.py`."""
+    """`tuning/autotune/design/gains.py`."""
 
     # WIDENINGS, SHORTEST_S: Filters are widened in so many steps: a torque filter to half its time,
     # a speed filter by √2; no torque filter is made shorter than this.
@@ -116,7 +116,7 @@ class autotune_gains:
 
 
 class autotune_notches:
-    """`tuning/autotune/notches.py`."""
+    """`tuning/autotune/design/notches.py`."""
 
     RISES_DB = 6.0
     """[dB] A resonance that rises by less bounds no gain. Origin: 97ed310d."""
@@ -134,7 +134,7 @@ class autotune_present:
 
 
 class autotune_raising:
-    """`tuning/autotune/raising.py`."""
+    """`tuning/autotune/verification/raising.py`."""
 
     # NOT_SHOWN_DB, MOST_SHOWN_DB: So much of a guaranteed gain margin is shown by raising the gain,
     # where the last crossover is above what was measured: all but this, and no more than that.
@@ -166,7 +166,7 @@ class autotune_raising:
 
 
 class autotune_reference:
-    """`tuning/autotune/reference.py`."""
+    """`tuning/autotune/verification/reference.py`."""
 
     LOWEST_HZ = 5.0
     """[Hz] Lowest line of a loop's response. Origin: 66bd184e."""
@@ -239,7 +239,7 @@ class autotune_time_budget:
 
 
 class autotune_verdict:
-    """`tuning/autotune/verdict.py`."""
+    """`tuning/autotune/verification/verdict.py`."""
 
     # MARGIN_DB, MARGIN_DEG, MS_RATIO: What a measured margin is known to; the designs keep more
     # than this in reserve.
@@ -273,7 +273,7 @@ class autotune_verdict:
 
 
 class autotune_verify:
-    """`tuning/autotune/verify.py`."""
+    """`tuning/autotune/verification/verify.py`."""
 
     SEEN = 0.8
     """[ratio] Coherence of lines that a bandwidth is read from where those do not hold it. Origin:

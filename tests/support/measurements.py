@@ -15,10 +15,10 @@ from backend.axes.axis.axis import Envelope
 from backend.axes.drive.drive import Drive
 from backend.records.library.measurements import pack
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
 from backend.tools.moving.step.evaluate import StepSettings
 from backend.tools.moving.step.run import _demand
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.evaluation import SweepSettings
 
 RATE_HZ = 1000.0

@@ -39,10 +39,10 @@ from backend.records.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import put_back, write_settings
-from backend.tools.tuning.autotune import candidates as tune_candidates
-from backend.tools.tuning.autotune import gains
-from backend.tools.tuning.autotune.axis_facts import read_facts
+from backend.tools.tuning.autotune.design import candidates as tune_candidates
+from backend.tools.tuning.autotune.design import gains
 from backend.tools.tuning.autotune.tool import candidate_info
 from backend.tools.tuning.notch import filters as notch
 from backend.tools.tuning.notch.meaning import meaning_of

@@ -13,8 +13,8 @@ from drive_sim import TURN, Drive, Mechanics, simulate
 
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, evaluate
 
 RATED_NM = 1.27

@@ -22,8 +22,8 @@ from backend.analysis.signals.excitation import BaseMotion, choose_lines, multis
 from backend.analysis.signals.line_spectra import Record
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.evaluation import SweepSettings, evaluate
 
 RATE = 1000.0

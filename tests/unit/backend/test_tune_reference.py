@@ -12,7 +12,7 @@ from backend.analysis.loop.loop_structure import Gains, speed_loop
 from backend.tools.measuring import excite
 from backend.tools.measuring.excite import Room, band_for, loop_reference
 from backend.tools.measuring.waveform import grid
-from backend.tools.tuning.autotune.reference import larger
+from backend.tools.tuning.autotune.verification.reference import larger
 from backend.tools.tuning.sweep.plan import reference_speed
 
 RATE = 1000.0

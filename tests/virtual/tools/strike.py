@@ -15,11 +15,11 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.restore import settle
 from backend.tools.mechanics.inertia.evaluation import InertiaOutcome, InertiaSettings
 from backend.tools.mechanics.inertia.run import inertia
-from backend.tools.tuning.autotune.axis_facts import read_facts
-from backend.tools.tuning.autotune.notches import Learning, learn_notches
+from backend.tools.tuning.autotune.design.notches import Learning, learn_notches
 from backend.tools.tuning.autotune.run import (
     AutotuneResult,
     AutotuneSettings,

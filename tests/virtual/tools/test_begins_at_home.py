@@ -12,12 +12,12 @@ from typing import Any, cast
 import pytest
 
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.moving.moves.go_back import go_back
-from backend.tools.tuning.autotune import notches as tune_notches
 from backend.tools.tuning.autotune import run as tuning
-from backend.tools.tuning.autotune import verify as tune_verify
-from backend.tools.tuning.autotune.axis_facts import read_facts
+from backend.tools.tuning.autotune.design import notches as tune_notches
 from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.autotune.verification import verify as tune_verify
 from backend.tools.tuning.notch import effect as notch_effect
 from backend.tools.tuning.sweep.evaluation import SweepSettings, completed
 from backend.tools.tuning.sweep.run import sweep

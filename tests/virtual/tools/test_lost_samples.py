@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.recording import bridged
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
 from backend.tools.mechanics.inertia.moves import first_look
 from backend.tools.mechanics.inertia.probe import probe_axis
 from backend.tools.moving.moves.go_back import go_back
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from backend.tools.tuning.sweep import run as sweep_tool
 from backend.tools.tuning.sweep.evaluation import Loop, SweepSettings
 from backend.tools.tuning.sweep.run import sweep

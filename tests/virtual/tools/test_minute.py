@@ -12,8 +12,8 @@ import pytest
 
 from backend.tools.measuring import repeats
 from backend.tools.tuning.autotune import time_budget as tune_time
-from backend.tools.tuning.autotune import verify as tune_verify
 from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.autotune.verification import verify as tune_verify
 from backend.tools.tuning.notch import effect as notch_effect
 from backend.tools.tuning.notch import in_loop as notch_in_loop
 from backend.tools.tuning.sweep import play as sweep_play

@@ -15,9 +15,9 @@ from backend.analysis.loop.notch import Notch
 from backend.analysis.response.signal_path.sampling import Hold
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import write_settings
-from backend.tools.tuning.autotune.axis_facts import read_facts
-from backend.tools.tuning.autotune.gains import plan_gains
+from backend.tools.tuning.autotune.design.gains import plan_gains
 from backend.tools.tuning.notch import effect as notch_effect
 from backend.tools.tuning.notch import filters as notch
 from backend.tools.tuning.notch.meaning import meaning_of, remember

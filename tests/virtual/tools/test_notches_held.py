@@ -13,7 +13,7 @@ from dataclasses import replace
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.tuning.autotune.axis_facts import read_facts
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.tuning.notch import in_loop as notch_in_loop
 from backend.tools.tuning.notch.meaning import NotchMeaning
 from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, completed

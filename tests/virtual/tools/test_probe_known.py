@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from backend.tools.measuring import recording
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.mechanics.inertia import probe
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

@@ -14,9 +14,9 @@ import numpy.typing as npt
 import pytest
 
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import put_back
 from backend.tools.tuning.autotune import again as tune_again
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from backend.tools.tuning.autotune.run import (
     AutotuneResult,
     AutotuneSettings,

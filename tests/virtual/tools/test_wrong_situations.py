@@ -17,13 +17,13 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.restore import settle
 from backend.tools.measuring.temporary import put_back, write_settings
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
 from backend.tools.mechanics.inertia.run import inertia
 from backend.tools.moving.step.evaluate import StepSettings
 from backend.tools.moving.step.run import step_response
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from backend.tools.tuning.autotune.run import (
     AutotuneResult,
     AutotuneSettings,

@@ -11,11 +11,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.mechanics.brake.result import BrakeResult, BrakeWay, Means, Obstacle, Verdict
 from backend.tools.mechanics.brake.settings import BrakeSettings
 from backend.tools.thresholds import brake_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -22,6 +22,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import channel
 from backend.axes.functions.closed_brake import forcing_keys, kept_closed, obstacle_of
 from backend.axes.scales.units import AxisUnits
+from backend.tools.measuring.axis_facts import AxisFacts, brake_opens_s, read_facts
 from backend.tools.measuring.recording import (
     Play,
     bus_limits,
@@ -47,7 +48,6 @@ from backend.tools.mechanics.brake.settings import BrakeSettings
 from backend.tools.mechanics.brake.texts import TEXTS, report
 from backend.tools.thresholds import brake_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, brake_opens_s, read_facts
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange

@@ -22,6 +22,7 @@ from backend.axes.drive.drive import Drive
 from backend.axes.drive.optional import existing, torque_limits
 from backend.axes.drive.terminals import read_terminals
 from backend.axes.scales.units import AxisUnits
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.recording import (
     Play,
     bus_limits,
@@ -51,7 +52,6 @@ from backend.tools.mechanics.first_power.settings import FirstPowerSettings
 from backend.tools.mechanics.first_power.texts import TEXTS, report
 from backend.tools.thresholds import first_power_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from drivers import link as bus
 from drivers.cia402 import Mode, State
 from drivers.errors import EnvelopeExceeded, NotAllowed

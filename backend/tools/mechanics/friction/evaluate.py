@@ -10,6 +10,7 @@ import numpy.typing as npt
 import scipy
 
 from backend.analysis.mechanics.stribeck import SpeedModel, speed_model
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.mechanics.friction.result import (
     Estimate,
@@ -21,7 +22,6 @@ from backend.tools.mechanics.friction.result import (
 from backend.tools.mechanics.friction.settings import FrictionSettings
 from backend.tools.thresholds import friction_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]

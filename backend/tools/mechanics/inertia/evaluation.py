@@ -11,11 +11,11 @@ import numpy.typing as npt
 from backend.analysis.mechanics.slow_moves.inertia import InertiaResult, Interval, estimate_inertia
 from backend.analysis.signals.spectrum import power_density
 from backend.axes.axis.axis import Envelope
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.mechanics.inertia.result import InertiaAnswer, InertiaIntervals, RatioReference
 from backend.tools.thresholds import inertia_evaluation as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.velocity_noise import velocity_without_noise
 from drivers.errors import NotAllowed
 from drivers.texts.message import reason_of

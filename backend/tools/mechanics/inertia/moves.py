@@ -11,6 +11,7 @@ import numpy.typing as npt
 from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import (
     Play,
     Recording,
@@ -26,7 +27,6 @@ from backend.tools.mechanics.inertia.probe import RoughFit, require_right_sign, 
 from backend.tools.mechanics.inertia.soft_loop import SoftLoop, soft_loop_of
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import inertia_moves as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep import profile_speed
 from drivers.cia402 import Mode
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange, exceeded

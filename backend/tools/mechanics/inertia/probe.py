@@ -19,6 +19,7 @@ from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.readings import Reading
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.interrupted import Interrupted, require_enabled
 from backend.tools.measuring.recording import (
     Play,
@@ -30,7 +31,6 @@ from backend.tools.measuring.recording import (
     play,
 )
 from backend.tools.thresholds import inertia_probe as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed
 

@@ -15,6 +15,7 @@ from backend.analysis.mechanics.slow_moves.inertia import InertiaResult
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, require_signals, share
 from backend.tools.measuring.repeats import Repeats
@@ -38,7 +39,6 @@ from backend.tools.moving.moves.end_search import find_ends
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import inertia_run as threshold
 from backend.tools.tool import Keep, Run, Tool
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text

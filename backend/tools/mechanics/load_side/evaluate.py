@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from backend.analysis.mechanics.load_side import LoadSide, Value, load_side
 from backend.analysis.mechanics.load_side_samples import FewSamples, LoadStands, TwoSides
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.mechanics.load_side.result import ErrorOrder, Estimate, Finding, LoadSideResult
 from backend.tools.mechanics.load_side.settings import LoadSideSettings
 from backend.tools.thresholds import load_side_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.errors import NotAllowed
 
 FloatArray = npt.NDArray[np.float64]

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from backend.analysis.mechanics.load_side_samples import GROUP, unwrapped
 from backend.axes.axis.axis import Envelope
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.load_position import load_position
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
@@ -24,7 +25,6 @@ from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import load_side_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
 from drivers.texts.message import text

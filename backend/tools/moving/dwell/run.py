@@ -11,6 +11,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.scales.units import AxisUnits
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import cycle_s, require_signals
 from backend.tools.mechanics.inertia.moves import speed_move
@@ -21,7 +22,6 @@ from backend.tools.moving.dwell.texts import TEXTS, report
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import dwell_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import text

@@ -11,13 +11,13 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.optional import torque_limits
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import temporary
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
 from backend.tools.mechanics.inertia.moves import speed_move
 from backend.tools.mechanics.inertia.probe import RoughFit
 from backend.tools.thresholds import moves_end_search as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits as limit_texts
 from drivers.texts.message import text

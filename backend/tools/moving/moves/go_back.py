@@ -8,10 +8,10 @@ import numpy as np
 
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Play, bus_limits, cycle_s, enabled, play, quiet
 from backend.tools.moving.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import moves_go_back as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.cia402 import Mode
 from drivers.errors import NotAllowed, exceeded
 from drivers.halt import HaltCause

@@ -11,8 +11,8 @@ from backend.axes.axis.polled import PolledGuard
 from backend.axes.drive.readings import Reading
 from backend.axes.scales.units import ramp_raw
 from backend.foundation.work.jobs import JobResult, Progress
+from backend.tools.measuring.axis_facts import brake_opens_s
 from backend.tools.thresholds import moves_homing as threshold
-from backend.tools.tuning.autotune.axis_facts import brake_opens_s
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

@@ -12,8 +12,8 @@ from backend.axes.axis.polled import PolledGuard
 from backend.axes.drive.optional import ramp_keys
 from backend.axes.scales.units import AxisUnits, ramp_raw
 from backend.foundation.work.jobs import JobResult, Progress
+from backend.tools.measuring.axis_facts import brake_opens_s
 from backend.tools.thresholds import moves_move as threshold
-from backend.tools.tuning.autotune.axis_facts import brake_opens_s
 from drivers import cia402
 from drivers.cia402 import Mode, State
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange

@@ -9,10 +9,10 @@ import numpy.typing as npt
 
 from backend.axes.motion.envelope import Envelope
 from backend.axes.scales.units import AxisUnits
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.mechanics.inertia.probe import RoughFit
 from backend.tools.moving.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import moves_strokes as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 
 FloatArray = npt.NDArray[np.float64]
 _TURN = 2 * np.pi

@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from backend.analysis.signals.step import MoveMetrics, StepMetrics, move_metrics, step_metrics
 from backend.axes.axis.axis import Envelope
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.figures import figures_of
 from backend.tools.measuring.recording import Recording
 from backend.tools.moving.step.result import MoveNumbers, StepAnswer, StepNumbers
 from backend.tools.thresholds import step_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 
 _TURN = 2 * np.pi
 LEAD_S = threshold.LEAD_S

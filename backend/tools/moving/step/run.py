@@ -8,6 +8,7 @@ import numpy.typing as npt
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.recording import (
     Play,
     bus_limits,
@@ -34,7 +35,6 @@ from backend.tools.moving.step.result import StepAnswer
 from backend.tools.moving.step.settings import StepRequest
 from backend.tools.moving.step.texts import TEXTS, report
 from backend.tools.tool import Keep, Run, Tool
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from drivers.cia402 import Mode
 from drivers.errors import OutOfRange
 from drivers.texts.message import text

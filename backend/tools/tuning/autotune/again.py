@@ -26,10 +26,15 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray, magnitude_
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.thresholds import autotune_again as threshold
 from backend.tools.tuning.autotune.apply import Applied, first_kept, nothing_stays, take_back
-from backend.tools.tuning.autotune.candidates import candidates_for
+from backend.tools.tuning.autotune.design.candidates import candidates_for
 from backend.tools.tuning.autotune.present import Trials, judged
-from backend.tools.tuning.autotune.verdict import fixed_of
-from backend.tools.tuning.autotune.verify import LOOKS, MOST_PAIRS, Verified, sharp_margins
+from backend.tools.tuning.autotune.verification.verdict import fixed_of
+from backend.tools.tuning.autotune.verification.verify import (
+    LOOKS,
+    MOST_PAIRS,
+    Verified,
+    sharp_margins,
+)
 from drivers.texts.message import Text, joined, text
 
 #: Outcome of the redesign. *same*: the design also holds for the plant that its loop shows, and was

@@ -15,9 +15,9 @@ from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import put_back_in_time, write_settings
 from backend.tools.thresholds import autotune_apply as threshold
-from backend.tools.tuning.autotune.candidates import plan
+from backend.tools.tuning.autotune.design.candidates import plan
 from backend.tools.tuning.autotune.time_budget import TimeLeft
-from backend.tools.tuning.autotune.verify import (
+from backend.tools.tuning.autotune.verification.verify import (
     HUM_PERCENT,
     Check,
     Keep,

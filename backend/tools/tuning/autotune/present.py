@@ -21,10 +21,10 @@ from backend.analysis.loop.notch import Notch
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import write_settings
 from backend.tools.thresholds import autotune_present as threshold
-from backend.tools.tuning.autotune import gains as gain_tool
 from backend.tools.tuning.autotune.apply import (
     Applied,
     first_kept,
@@ -32,10 +32,10 @@ from backend.tools.tuning.autotune.apply import (
     stages,
     take_back,
 )
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.design import gains as gain_tool
 from backend.tools.tuning.autotune.time_budget import TimeLeft
-from backend.tools.tuning.autotune.verdict import fixed_of
-from backend.tools.tuning.autotune.verify import Check, Keep, otherwise, verify
+from backend.tools.tuning.autotune.verification.verdict import fixed_of
+from backend.tools.tuning.autotune.verification.verify import Check, Keep, otherwise, verify
 from backend.tools.tuning.notch import filters as notch_tool
 from backend.tools.tuning.notch.effect import unknown
 from backend.tools.tuning.notch.meaning import meaning_of

@@ -17,6 +17,7 @@ from backend.analysis.loop.loop_structure import Gains
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.recording import cycle_s, quiet
 from backend.tools.measuring.temporary import stopping_hard, temporary
@@ -27,7 +28,6 @@ from backend.tools.mechanics.inertia.result import verdict_of
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.step import evaluate as step_evaluation
 from backend.tools.thresholds import autotune_run as threshold
-from backend.tools.tuning.autotune import gains as gain_tool
 from backend.tools.tuning.autotune.again import (
     Again,
     Designing,
@@ -36,17 +36,23 @@ from backend.tools.tuning.autotune.again import (
     first_that_holds,
 )
 from backend.tools.tuning.autotune.apply import part
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
-from backend.tools.tuning.autotune.candidates import (
+from backend.tools.tuning.autotune.design import gains as gain_tool
+from backend.tools.tuning.autotune.design.candidates import (
     Design,
     cautious_design,
     design_for,
     plant_of,
 )
-from backend.tools.tuning.autotune.notches import Learning, learn_notches, learning_s
+from backend.tools.tuning.autotune.design.notches import Learning, learn_notches, learning_s
 from backend.tools.tuning.autotune.present import Trials
 from backend.tools.tuning.autotune.time_budget import NOT_AGAIN, TimeLeft
-from backend.tools.tuning.autotune.verify import Check, Keep, Verified, otherwise, unseen
+from backend.tools.tuning.autotune.verification.verify import (
+    Check,
+    Keep,
+    Verified,
+    otherwise,
+    unseen,
+)
 from backend.tools.tuning.sweep import evaluation as sweep_evaluation
 from backend.tools.tuning.sweep import run as sweep_tool
 from drivers.cia402 import State

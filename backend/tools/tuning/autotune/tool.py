@@ -24,7 +24,7 @@ from backend.tools.tuning.autotune.result import (
 from backend.tools.tuning.autotune.run import AutotuneResult, autotune
 from backend.tools.tuning.autotune.settings import AutotuneRequest
 from backend.tools.tuning.autotune.texts import TEXTS, report
-from backend.tools.tuning.autotune.verify import Verified
+from backend.tools.tuning.autotune.verification.verify import Verified
 from backend.tools.tuning.sweep import stored as sweep_stored
 from backend.tools.wire_message import wire_messages, words_of
 from drivers.texts.message import text

@@ -18,6 +18,7 @@ from backend.analysis.loop.loop_structure import LoopFilters
 from backend.analysis.response.signal_path.sampling import lag_response
 from backend.analysis.signals.excitation import choose_lines
 from backend.axes.axis.axis import Axis
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.pair import Pair, play_pair
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
@@ -26,9 +27,8 @@ from backend.tools.moving.moves.go_back import require_back
 from backend.tools.moving.moves.raised_cosine import raised_cosine
 from backend.tools.thresholds import gantry_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
-from backend.tools.tuning.autotune.gains import read_gains
-from backend.tools.tuning.autotune.verdict import fixed_of
+from backend.tools.tuning.autotune.design.gains import read_gains
+from backend.tools.tuning.autotune.verification.verdict import fixed_of
 from backend.tools.tuning.gantry.evaluate import Experiments, Shape, evaluate, reevaluate
 from backend.tools.tuning.gantry.result import GantryResult
 from backend.tools.tuning.gantry.settings import GantrySettings

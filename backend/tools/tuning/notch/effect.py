@@ -26,6 +26,7 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import (
     Play,
     Recording,
@@ -41,7 +42,6 @@ from backend.tools.measuring.repeats import Repeats
 from backend.tools.measuring.temporary import stopping_hard, temporary
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import notch_effect as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.notch.filters import plan_notches
 from backend.tools.tuning.notch.meaning import NotchMeaning
 from backend.tools.tuning.notch.trials import BEFORE, Trial, least_of, limits_of, raw_of, trials_of

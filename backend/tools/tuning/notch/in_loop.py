@@ -27,12 +27,12 @@ from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording, require_signals
 from backend.tools.measuring.repeats import Repeats
 from backend.tools.measuring.temporary import temporary
 from backend.tools.thresholds import notch_in_loop as threshold
-from backend.tools.tuning.autotune import gains
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.design import gains
 from backend.tools.tuning.notch.effect import ATTEMPTS, periods_of, samples_lost, tried_with
 from backend.tools.tuning.notch.meaning import NotchMeaning
 from backend.tools.tuning.sweep import speed_injection

@@ -10,6 +10,7 @@ import numpy as np
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.signals.shaper import shaped
 from backend.axes.drive.drive import Drive
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.recording import (
     Play,
     Recording,
@@ -26,7 +27,6 @@ from backend.tools.measuring.temporary import stopping_hard
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import shaping_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.tuning.shaping.evaluate import (
     Moves,
     choose,

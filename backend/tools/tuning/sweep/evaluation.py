@@ -37,10 +37,10 @@ from backend.analysis.response.signal_path.sampling import (
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Waveform
 from backend.tools.thresholds import sweep_evaluation as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.speed_injection import speed_gain
 from drivers.texts.message import Text, Unsuitable, text
 

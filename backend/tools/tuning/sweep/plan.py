@@ -12,11 +12,11 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.optional import existing
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.load_position import recorded_load_position
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.mechanics.inertia.probe import Probed
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
-from backend.tools.tuning.autotune.gains import read_gains
+from backend.tools.tuning.autotune.design.gains import read_gains
 from backend.tools.tuning.sweep import speed_injection
 from backend.tools.tuning.sweep.evaluation import Loop, SweepSettings
 from drivers.errors import NotAllowed, OutOfRange

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from backend.analysis.signals.excitation import Excitation, crest_factor
 from backend.axes.axis.axis import Axis
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.waveform import Band
-from backend.tools.tuning.autotune.axis_facts import read_facts
 from backend.tools.tuning.sweep.evaluation import SweepSettings
 from drivers.errors import OutOfRange
 from drivers.texts.message import reason_of

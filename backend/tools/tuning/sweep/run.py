@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import require_signals, takes_torque
 from backend.tools.measuring.repeats import Repeats
@@ -20,7 +21,6 @@ from backend.tools.measuring.temporary import stopping_hard, temporary
 from backend.tools.mechanics.inertia.probe import PULLED, Probed, holding_torque, probe_axis
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.tool import Keep, Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.tuning.notch import filters as notch_tool
 from backend.tools.tuning.sweep.adaptive import play_informative
 from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, evaluate

@@ -13,9 +13,9 @@ from backend.analysis.signals import excitation as signals
 from backend.analysis.signals.arrays import FloatArray
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.evaluation import (
     LoadSide,
     Records,

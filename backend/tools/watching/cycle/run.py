@@ -21,9 +21,9 @@ from backend.axes.scales.units import AxisUnits
 from backend.axes.scope.hub import ScopeHub
 from backend.foundation.people.rights import Right
 from backend.records.recording.reader import RecordingReader
+from backend.tools.measuring.axis_facts import si
 from backend.tools.thresholds import cycle_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import si
 from backend.tools.watching.cycle.evaluate import (
     CycleFacts,
     Samples,

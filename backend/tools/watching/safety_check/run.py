@@ -17,6 +17,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import channel
 from backend.axes.scales.units import AxisUnits
 from backend.foundation.people.identity import acting_person
+from backend.tools.measuring.axis_facts import brake_opens_s, read_facts
 from backend.tools.measuring.interrupted import Interrupted
 from backend.tools.measuring.recording import (
     Play,
@@ -32,7 +33,6 @@ from backend.tools.measuring.recording import (
 from backend.tools.thresholds import safety_check_evaluate
 from backend.tools.thresholds import safety_check_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import brake_opens_s, read_facts
 from backend.tools.watching.safety_check.evaluate import Trace, evaluate, reevaluate
 from backend.tools.watching.safety_check.result import SafetyResult
 from backend.tools.watching.safety_check.settings import SafetySettings

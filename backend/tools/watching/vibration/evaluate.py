@@ -11,10 +11,10 @@ import numpy.typing as npt
 from backend.analysis.vibration.level_peak import LevelPeak, level_peaks
 from backend.analysis.vibration.orders import Component, Seen, components, levels
 from backend.analysis.vibration.sinusoids import Segment, Sinusoid, about_trend, sinusoids
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.thresholds import vibration_evaluate as threshold
 from backend.tools.tool import Arrays, Meta
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.watching.vibration.result import (
     Place,
     SpeedRange,

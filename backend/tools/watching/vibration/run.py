@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.axes.scales.units import AxisUnits
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.recording import Recording, cycle_s, require_signals, share
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
@@ -17,7 +18,6 @@ from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.moves.strokes import Room, Stroke, representable, room_of, speeds_of
 from backend.tools.thresholds import vibration_run as threshold
 from backend.tools.tool import Run, Tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts
 from backend.tools.watching.vibration.evaluate import (
     Plateaus,
     closer_about,

@@ -16,8 +16,8 @@ from backend.analysis.loop.design import Candidate
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.interrupted import Interrupted, raise_if_ended
 from backend.tools.tuning.autotune import apply as tune_apply
-from backend.tools.tuning.autotune import notches as tune_notches
 from backend.tools.tuning.autotune import present as tune_present
+from backend.tools.tuning.autotune.design import notches as tune_notches
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, MotionHalted, NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, LoopState

@@ -11,7 +11,7 @@ import pytest
 
 from backend.analysis.loop.loop_structure import Gains, LoopFilters
 from backend.axes.drive.drive import Drive
-from backend.tools.tuning.autotune.gains import (
+from backend.tools.tuning.autotune.design.gains import (
     filter_choices,
     plan_design,
     plan_filters,

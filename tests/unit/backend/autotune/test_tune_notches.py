@@ -12,8 +12,8 @@ import pytest
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.frf import Frf
 from backend.foundation.work.jobs import Progress
-from backend.tools.tuning.autotune import notches as tune_notches
-from backend.tools.tuning.autotune.notches import out_of_sight
+from backend.tools.tuning.autotune.design import notches as tune_notches
+from backend.tools.tuning.autotune.design.notches import out_of_sight
 from backend.tools.tuning.autotune.time_budget import TimeLeft
 from backend.tools.tuning.notch.meaning import NotchMeaning
 from backend.tools.tuning.sweep.evaluation import SweepResult

@@ -15,12 +15,17 @@ from backend.analysis.loop.margins import Margins
 from backend.analysis.response.frf import Frf
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.moving.step.evaluate import LEAD_S, StepResult
-from backend.tools.tuning.autotune import verify as tune_verify
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.autotune.time_budget import TimeLeft
-from backend.tools.tuning.autotune.verdict import in_words, pieces, reported_lines, sharp_lines
-from backend.tools.tuning.autotune.verify import (
+from backend.tools.tuning.autotune.verification import verify as tune_verify
+from backend.tools.tuning.autotune.verification.verdict import (
+    in_words,
+    pieces,
+    reported_lines,
+    sharp_lines,
+)
+from backend.tools.tuning.autotune.verification.verify import (
     Check,
     Verified,
     bearable,

@@ -9,9 +9,9 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Band
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep import speed_injection
 from backend.tools.tuning.sweep.adaptive import _more_informative
 from backend.tools.tuning.sweep.evaluation import SweepSettings

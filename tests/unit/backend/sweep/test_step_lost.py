@@ -11,7 +11,7 @@ from backend.axes.axis.axis import Envelope
 from backend.tools.measuring.recording import Recording, bridged
 from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings, answer_of, evaluate
 from backend.tools.moving.step.texts import TEXTS, report
-from backend.tools.tuning.autotune.verify import restless
+from backend.tools.tuning.autotune.verification.verify import restless
 from backend.tools.watching.health import run as health
 from backend.tools.watching.health.settings import HealthSettings
 

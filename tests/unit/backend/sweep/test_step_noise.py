@@ -19,7 +19,7 @@ from backend.tools.moving.step.evaluate import (
     evaluate,
     significant_size,
 )
-from backend.tools.tuning.autotune.gain_steps import judged
+from backend.tools.tuning.autotune.verification.gain_steps import judged
 
 RATE, TAU_S = 1000.0, 1 / (2 * np.pi * 65.0)
 ENVELOPE = Envelope(4.0, 1500.0, 100.0, 60.0)

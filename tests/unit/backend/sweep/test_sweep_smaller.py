@@ -10,8 +10,8 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.interrupted import Interrupted
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep.evaluation import SweepSettings
 from backend.tools.tuning.sweep.plan import Setup, sequences_of
 from backend.tools.tuning.sweep.play import _smaller, _too_much

@@ -11,8 +11,8 @@ import pytest
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.sweep import play as sweep_play
 from backend.tools.tuning.sweep import speed_injection
 from backend.tools.tuning.sweep.evaluation import SweepSettings

@@ -12,6 +12,7 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.mechanics.inertia import run as inertia_run
 from backend.tools.mechanics.inertia.evaluation import InertiaSettings
@@ -19,7 +20,6 @@ from backend.tools.mechanics.inertia.moves import FirstLook
 from backend.tools.mechanics.inertia.probe import RoughFit
 from backend.tools.moving.step import run as step_run
 from backend.tools.moving.step.evaluate import StepSettings
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from drivers.errors import LinkLost, NotAllowed, OutOfRange
 
 FACTS = AxisFacts(1.27, True, None, None, None, None, None, True)

@@ -10,6 +10,7 @@ from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.recording import cycle_s, quiet
 from backend.tools.measuring.repeats import Repeats
@@ -17,7 +18,6 @@ from backend.tools.mechanics.inertia import evaluation as inertia_evaluation
 from backend.tools.mechanics.inertia.probe import PULLED
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.thresholds import autotune_notches as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
 from backend.tools.tuning.autotune.time_budget import TimeLeft
 from backend.tools.tuning.notch import effect as notch_effect
 from backend.tools.tuning.notch import trials as notch_trials

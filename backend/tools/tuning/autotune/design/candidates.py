@@ -15,9 +15,9 @@ from backend.analysis.loop.mode_above import modes_above
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.thresholds import autotune_candidates as threshold
-from backend.tools.tuning.autotune import gains as gain_tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.design import gains as gain_tool
 from backend.tools.tuning.notch import effect as notch_effect
 from backend.tools.tuning.notch import filters as notch_tool
 from backend.tools.tuning.notch.meaning import meaning_of

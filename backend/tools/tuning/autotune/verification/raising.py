@@ -18,10 +18,10 @@ from backend.analysis.loop.loop_verdict import (
 from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.thresholds import autotune_raising as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
-from backend.tools.tuning.autotune.gain_steps import GainSteps
-from backend.tools.tuning.autotune.verdict import (
+from backend.tools.tuning.autotune.verification.gain_steps import GainSteps
+from backend.tools.tuning.autotune.verification.verdict import (
     MARGIN_DB,
     MARGIN_DEG,
     MS_RATIO,

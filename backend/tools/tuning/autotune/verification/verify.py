@@ -20,24 +20,24 @@ from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import quiet
 from backend.tools.mechanics.inertia.probe import holding_torque
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.step import evaluate as step_evaluation
 from backend.tools.moving.step.run import step_response
 from backend.tools.thresholds import autotune_verify as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
-from backend.tools.tuning.autotune.gain_steps import GainSteps, gain_steps, steps_to
-from backend.tools.tuning.autotune.raising import (
+from backend.tools.tuning.autotune.time_budget import NOT_AGAIN, TimeLeft
+from backend.tools.tuning.autotune.verification.gain_steps import GainSteps, gain_steps, steps_to
+from backend.tools.tuning.autotune.verification.raising import (
     by_raised_gain,
     not_shown,
     raised_to,
     share_to_show,
     surely_db,
 )
-from backend.tools.tuning.autotune.reference import reference_for
-from backend.tools.tuning.autotune.time_budget import NOT_AGAIN, TimeLeft
-from backend.tools.tuning.autotune.verdict import (
+from backend.tools.tuning.autotune.verification.reference import reference_for
+from backend.tools.tuning.autotune.verification.verdict import (
     COHERENT,
     LINES,
     MARGIN_DB,

@@ -16,8 +16,8 @@ import numpy as np
 from backend.analysis.loop.loop_structure import DriveLoops, Gains, LoopFilters
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from backend.tools.thresholds import autotune_gains as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, read_facts, si, si_raw, si_value
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts.message import Text, text
 from profiles.schema import GainSpec, StiffnessTable

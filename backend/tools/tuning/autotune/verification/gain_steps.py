@@ -17,14 +17,14 @@ import scipy
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
+from backend.tools.measuring.axis_facts import AxisFacts, si_value
 from backend.tools.measuring.interrupted import ends_all
 from backend.tools.measuring.temporary import temporary
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings
 from backend.tools.moving.step.run import step_response
 from backend.tools.thresholds import autotune_gain_steps as threshold
-from backend.tools.tuning.autotune import gains as gain_tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts, si_value
+from backend.tools.tuning.autotune.design import gains as gain_tool
 from drivers.errors import DriveError
 from drivers.texts.message import text
 

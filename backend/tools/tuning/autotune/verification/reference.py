@@ -17,12 +17,12 @@ from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.excite import Room, band_for
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.waveform import grid
 from backend.tools.thresholds import autotune_reference as threshold
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
-from backend.tools.tuning.autotune.verdict import loops_of
+from backend.tools.tuning.autotune.verification.verdict import loops_of
 from backend.tools.tuning.sweep.plan import drive_limit_percent, reference_speed
 from drivers.errors import NotAllowed
 

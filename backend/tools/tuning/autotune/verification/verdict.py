@@ -17,9 +17,9 @@ from backend.analysis.response.signal_path.reference_path import ReferencePath, 
 from backend.analysis.response.signal_path.sampling import Hold
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.thresholds import autotune_verdict as threshold
-from backend.tools.tuning.autotune import gains as gain_tool
-from backend.tools.tuning.autotune.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.design import gains as gain_tool
 from backend.tools.tuning.notch import filters as notch_tool
 from backend.tools.tuning.notch.meaning import meaning_of
 from drivers.texts.message import Text, text
