@@ -12,7 +12,7 @@ from backend.api.messages import convert
 from backend.api.messages.errors import NotFound, message_of, message_or_none, words_of
 from backend.api.messages.models import JobInfo
 from backend.api.requests.context import Connection, Controlled, TheBench
-from backend.api.station.models_ethercat import (
+from backend.api.station.ethercat.models import (
     AliasRequest,
     CountersRequest,
     EthercatPermissions,

@@ -12,8 +12,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from backend.api.requests.context import Connection, TheBench
 from backend.api.requests.named_profile import profile_named
-from backend.api.station.ethercat import calm_segment, opened_segment, require_confirmed
-from backend.api.station.models_ethercat import EepromComparison, EepromDifference, EepromPlan
+from backend.api.station.ethercat.models import EepromComparison, EepromDifference, EepromPlan
+from backend.api.station.ethercat.routes import calm_segment, opened_segment, require_confirmed
 from backend.axes.drive.identity import confirm_identity
 from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
