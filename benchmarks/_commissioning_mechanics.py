@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from backend.tools.gantry.result import GantryResult
+from backend.tools.tuning.gantry.result import GantryResult
 from benchmarks._figures import Figure, at_most, off_percent, share
 from drivers.virtual.mechanics import MechanicsSpec, gantry_response
 from drivers.virtual.wires.netns import Namespace, unavailable

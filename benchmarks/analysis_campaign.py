@@ -28,7 +28,7 @@ from random_axes import (  # noqa: E402
 )
 
 from backend.analysis.response.frf import Frf  # noqa: E402
-from backend.tools.sweep.evaluation import SweepResult  # noqa: E402
+from backend.tools.tuning.sweep.evaluation import SweepResult  # noqa: E402
 
 #: Fewer coherent lines than this say nothing of a band.
 _FEW = 6

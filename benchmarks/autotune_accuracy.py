@@ -11,13 +11,13 @@ from backend.analysis.loop.measured_plant import measured_plant
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.candidates import candidates_for
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.inertia.evaluation import Scheme
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.recording import cycle_s
 from backend.tools.measuring.temporary import put_back
-from backend.tools.sweep.evaluation import completed
+from backend.tools.mechanics.inertia.evaluation import Scheme
+from backend.tools.tuning.autotune.design.candidates import candidates_for
+from backend.tools.tuning.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.tuning.sweep.evaluation import completed
 from benchmarks._tune_figures import marked, true_modes
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.rig import WIDE

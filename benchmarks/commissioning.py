@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from backend.tools.cycle.run import TOOL as CYCLE
-from backend.tools.cycle.settings import CycleSettings
 from backend.tools.tool import Run
-from backend.tools.trend.compare import compare
+from backend.tools.watching.cycle.run import TOOL as CYCLE
+from backend.tools.watching.cycle.settings import CycleSettings
+from backend.tools.watching.trend.compare import compare
 from benchmarks import cycle_load, health_trend
 from benchmarks._commissioning_mechanics import gantry, load_side, vibration
 from benchmarks._figures import Figure, at_least, at_most, off_percent, print_figures, share

@@ -20,9 +20,9 @@ from pydantic import TypeAdapter
 from backend.api.health.models import AxisHealth
 from backend.api.health.routes import info_of
 from backend.foundation.store.database import Store
-from backend.tools.health.result import HealthRound, HealthValue, Quantity
-from backend.tools.health.settings import HealthSettings
-from backend.tools.trend.records import AxisOf, HealthRecords
+from backend.tools.watching.health.result import HealthRound, HealthValue, Quantity
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.records import AxisOf, HealthRecords
 from tests.support.postgres import Postgres, binaries
 
 AXES, RUNS, AIM_S = 50, 2000, 1.0

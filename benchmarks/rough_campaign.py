@@ -33,14 +33,14 @@ from unittest.mock import patch
 import numpy as np
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import apply, present
-from backend.tools.autotune import verify as verification
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.autotune.verify import Verified
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
-from backend.tools.sweep.evaluation import SweepResult, SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.tuning.autotune import apply, present
+from backend.tools.tuning.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.tuning.autotune.verification import verify as verification
+from backend.tools.tuning.autotune.verification.verify import Verified
+from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from benchmarks._rough_cases import CLASSES, Case, case_of
 from benchmarks._true_loop import true_margins
 from benchmarks._tune_figures import true_modes

@@ -28,11 +28,11 @@ import numpy.typing as npt
 from backend.axes.axis.axis import Axis, Envelope
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
-from backend.tools.inertia.evaluation import InertiaOutcome, InertiaSettings, Scheme
-from backend.tools.inertia.run import inertia
-from backend.tools.sweep import profile_speed
-from backend.tools.sweep.evaluation import Loop, SweepResult, SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaOutcome, InertiaSettings, Scheme
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.tuning.sweep.evaluation import Loop, SweepResult, SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from benchmarks._best_linear import Raw, best_linear, played_of
 from benchmarks._tune_figures import marked, true_modes
 from benchmarks.autotune_accuracy import tuned

@@ -45,12 +45,12 @@ from backend.api.security.socket import OpenSockets
 from backend.api.station import adapters as routes_adapters
 from backend.api.station import description as routes_description
 from backend.api.station import doctor as routes_doctor
-from backend.api.station import eeprom as routes_eeprom
-from backend.api.station import ethercat as routes_ethercat
 from backend.api.station import flight as routes_flight
 from backend.api.station import preflight as routes_preflight
 from backend.api.station import routes as routes_bench
 from backend.api.station.box import routes as routes_box
+from backend.api.station.ethercat import eeprom as routes_eeprom
+from backend.api.station.ethercat import routes as routes_ethercat
 from backend.api.tuning import measure as routes_tune
 from backend.axes.functions.forcing import ForcingSessions
 from backend.foundation.people.station import People

@@ -12,10 +12,10 @@ from backend.report.render.plot import Curve, Plot
 from backend.report.texts import Words
 from backend.report.tools import grid_table, kind_title, note_of, tool_blocks
 from backend.tools.measuring.numbers import fixed, milliseconds, moment, significant
-from backend.tools.step.result import StepAnswer
-from backend.tools.sweep.result import SweepAnswer
-from backend.tools.sweep.run import TOOL as SWEEP
-from backend.tools.sweep.texts import margins_grid, resonances_grid
+from backend.tools.moving.step.result import StepAnswer
+from backend.tools.tuning.sweep.result import SweepAnswer
+from backend.tools.tuning.sweep.run import TOOL as SWEEP
+from backend.tools.tuning.sweep.texts import margins_grid, resonances_grid
 
 #: Distinguishable in print and for colour-blind readers: dark blue, orange; grey for the demand.
 _NOW, _EARLIER, _DEMAND = "#1a5c94", "#c2571a", "#5b6770"

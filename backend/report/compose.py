@@ -25,10 +25,10 @@ from backend.tools.measuring.numbers import (
     moment,
     significant,
 )
-from backend.tools.step.result import StepAnswer
-from backend.tools.sweep.result import SweepAnswer
-from backend.tools.sweep.run import TOOL as SWEEP
-from backend.tools.sweep.texts import tuned_verdict
+from backend.tools.moving.step.result import StepAnswer
+from backend.tools.tuning.sweep.result import SweepAnswer
+from backend.tools.tuning.sweep.run import TOOL as SWEEP
+from backend.tools.tuning.sweep.texts import tuned_verdict
 
 
 def compose(facts: Facts, language: Language) -> Document:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from backend.report.document import Block, Note, Table
 from backend.report.texts import Words
 from backend.tools.measuring.numbers import moment
-from backend.tools.trend.records import Baseline, Condition
-from backend.tools.trend.words import message_of
+from backend.tools.watching.trend.records import Baseline, Condition
+from backend.tools.watching.trend.words import message_of
 
 
 def condition(found: Condition, baseline: Baseline, words: Words) -> list[Block]:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 
-from backend.tools.autotune.result import VerdictInfo
 from backend.tools.tool import ToolResult
-from backend.tools.trend.records import Condition
+from backend.tools.tuning.autotune.result import VerdictInfo
+from backend.tools.watching.trend.records import Condition
 from drivers.texts.message import Text
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from backend.report.document import Block, Note, Table, Tone
 from backend.report.texts import Words
-from backend.tools.autotune.result import BandInfo, IntervalInfo, VerdictInfo
 from backend.tools.measuring.numbers import NONE, fixed, hertz
+from backend.tools.tuning.autotune.result import BandInfo, IntervalInfo, VerdictInfo
 
 
 def bands(verdict: VerdictInfo, words: Words) -> list[Block]:

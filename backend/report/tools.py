@@ -10,11 +10,11 @@ from backend.records.library.measurements import BadMeasurement
 from backend.report.document import Block, Figure, Note, Table
 from backend.report.render.plot import Curve, Plot
 from backend.report.texts import Words
-from backend.tools.autotune.result import VerdictInfo
 from backend.tools.measuring.numbers import NONE, significant
 from backend.tools.registry import BY_KIND
 from backend.tools.tool import AnyTool, Chart, Grid, Interval, Section, ToolResult
 from backend.tools.tool import Note as ToolNote
+from backend.tools.tuning.autotune.result import VerdictInfo
 from drivers.texts.validation import refusal_of
 
 _COLORS = ("#1a5c94", "#c2571a")

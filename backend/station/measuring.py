@@ -11,7 +11,7 @@ from backend.axes.drive.ports import Port
 from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.sweep import profile_speed
+from backend.tools.tuning.sweep import profile_speed
 from drivers.errors import DriveError, LinkTimeout
 from drivers.texts.message import text
 

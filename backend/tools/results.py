@@ -9,21 +9,21 @@ from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
-from backend.tools.autotune.result import AutotuneAnswer
-from backend.tools.brake.result import BrakeResult
-from backend.tools.cycle.result import CycleResult
-from backend.tools.dwell.result import DwellResult
-from backend.tools.first_power.result import FirstPowerResult
-from backend.tools.friction.result import FrictionResult
-from backend.tools.gantry.result import GantryResult
-from backend.tools.health.result import HealthResult
-from backend.tools.inertia.result import InertiaAnswer
-from backend.tools.load_side.result import LoadSideResult
-from backend.tools.safety_check.result import SafetyResult
-from backend.tools.shaping.result import ShapingResult
-from backend.tools.step.result import StepAnswer
-from backend.tools.sweep.result import SweepAnswer
-from backend.tools.vibration.result import VibrationResult
+from backend.tools.mechanics.brake.result import BrakeResult
+from backend.tools.mechanics.first_power.result import FirstPowerResult
+from backend.tools.mechanics.friction.result import FrictionResult
+from backend.tools.mechanics.inertia.result import InertiaAnswer
+from backend.tools.mechanics.load_side.result import LoadSideResult
+from backend.tools.moving.dwell.result import DwellResult
+from backend.tools.moving.step.result import StepAnswer
+from backend.tools.tuning.autotune.result import AutotuneAnswer
+from backend.tools.tuning.gantry.result import GantryResult
+from backend.tools.tuning.shaping.result import ShapingResult
+from backend.tools.tuning.sweep.result import SweepAnswer
+from backend.tools.watching.cycle.result import CycleResult
+from backend.tools.watching.health.result import HealthResult
+from backend.tools.watching.safety_check.result import SafetyResult
+from backend.tools.watching.vibration.result import VibrationResult
 
 ToolOutcome: TypeAlias = Annotated[
     FrictionResult

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 
 class autotune_again:
-    """`autotune/again.py`."""
+    """`tuning/autotune/again.py`."""
 
     # WIDTH, DB, DEG: A prediction stands within these: share of the -3 dB point, dB and degrees.
     # The aims are 10 %, 3 dB and 6° (tuning.md, section 5).
@@ -28,7 +28,7 @@ class autotune_again:
 
 
 class autotune_apply:
-    """`autotune/apply.py`."""
+    """`tuning/autotune/apply.py`."""
 
     # SOFTENED, QUIETER: So often a candidate that oscillates is made softer, and to this share of
     # the hum that is permitted.
@@ -39,7 +39,7 @@ class autotune_apply:
 
 
 class autotune_candidates:
-    """`autotune/candidates.py`."""
+    """`tuning/autotune/design/candidates.py`."""
 
     VERIFIABLE = 0.2
     """[ratio] A loop can be verified up to this share of the sample rate, so none is designed above
@@ -56,7 +56,7 @@ class autotune_candidates:
 
 
 class autotune_gain_steps:
-    """`autotune/gain_steps.py`."""
+    """`tuning/autotune/verification/gain_steps.py`."""
 
     STEP_DB = 2.5
     """[dB] Gains are raised in steps of this many dB, and the last one to what is asked for.
@@ -99,7 +99,7 @@ class autotune_gain_steps:
 
 
 class autotune_gains:
-    """`autotune/gains.py`."""
+    """`tuning/autotune/design/gains.py`."""
 
     # WIDENINGS, SHORTEST_S: Filters are widened in so many steps: a torque filter to half its time,
     # a speed filter by √2; no torque filter is made shorter than this.
@@ -116,7 +116,7 @@ class autotune_gains:
 
 
 class autotune_notches:
-    """`autotune/notches.py`."""
+    """`tuning/autotune/design/notches.py`."""
 
     RISES_DB = 6.0
     """[dB] A resonance that rises by less bounds no gain. Origin: 97ed310d."""
@@ -126,7 +126,7 @@ class autotune_notches:
 
 
 class autotune_present:
-    """`autotune/present.py`."""
+    """`tuning/autotune/present.py`."""
 
     SLOWER = 0.9
     """[ratio] A design whose speed gain is this much below what the axis has is slower. Origin:
@@ -134,7 +134,7 @@ class autotune_present:
 
 
 class autotune_raising:
-    """`autotune/raising.py`."""
+    """`tuning/autotune/verification/raising.py`."""
 
     # NOT_SHOWN_DB, MOST_SHOWN_DB: So much of a guaranteed gain margin is shown by raising the gain,
     # where the last crossover is above what was measured: all but this, and no more than that.
@@ -166,7 +166,7 @@ class autotune_raising:
 
 
 class autotune_reference:
-    """`autotune/reference.py`."""
+    """`tuning/autotune/verification/reference.py`."""
 
     LOWEST_HZ = 5.0
     """[Hz] Lowest line of a loop's response. Origin: 66bd184e."""
@@ -200,7 +200,7 @@ class autotune_reference:
 
 
 class autotune_run:
-    """`autotune/run.py`."""
+    """`tuning/autotune/run.py`."""
 
     SATURATED = 0.25
     """[ratio] A response with more of its samples at a torque limit is none. Origin: 7166e5a3 with
@@ -214,7 +214,7 @@ class autotune_run:
 
 
 class autotune_time_budget:
-    """`autotune/time_budget.py`."""
+    """`tuning/autotune/time_budget.py`."""
 
     AROUND_S = 4.0
     """[s] Writing a design, standing still and a step, next to the measurement of the loop. Origin:
@@ -239,7 +239,7 @@ class autotune_time_budget:
 
 
 class autotune_verdict:
-    """`autotune/verdict.py`."""
+    """`tuning/autotune/verification/verdict.py`."""
 
     # MARGIN_DB, MARGIN_DEG, MS_RATIO: What a measured margin is known to; the designs keep more
     # than this in reserve.
@@ -273,7 +273,7 @@ class autotune_verdict:
 
 
 class autotune_verify:
-    """`autotune/verify.py`."""
+    """`tuning/autotune/verification/verify.py`."""
 
     SEEN = 0.8
     """[ratio] Coherence of lines that a bandwidth is read from where those do not hold it. Origin:
@@ -310,7 +310,7 @@ class autotune_verify:
 
 
 class brake_evaluate:
-    """`brake/evaluate.py`."""
+    """`mechanics/brake/evaluate.py`."""
 
     PRELOAD = 0.1
     """[ratio] Share of the test torque that takes up play before travel counts. Origin:
@@ -340,7 +340,7 @@ class brake_evaluate:
 
 
 class brake_texts:
-    """`brake/texts.py`."""
+    """`mechanics/brake/texts.py`."""
 
     CREPT = 0.05
     """[ratio] Slip below this share of the limit is what an encoder and a settling hub show.
@@ -348,7 +348,7 @@ class brake_texts:
 
 
 class brake_run:
-    """`brake/run.py`."""
+    """`mechanics/brake/run.py`."""
 
     # LEAD_S, PRELOAD_S, STILL_S, TOP_S, DOWN_S, END_S: Seconds of each part of the sequence next to
     # its ramp.
@@ -380,7 +380,7 @@ class brake_run:
 
 
 class first_power_evaluate:
-    """`first_power/evaluate.py`."""
+    """`mechanics/first_power/evaluate.py`."""
 
     GOAL = 0.85
     """[ratio] Share of the permitted travel that the shaft is to go each way. Origin: 8b39c64c."""
@@ -396,7 +396,7 @@ class first_power_evaluate:
 
 
 class first_power_run:
-    """`first_power/run.py`."""
+    """`mechanics/first_power/run.py`."""
 
     # PULSE_S, LEAD_S, AFTER_S, RAMP_S: Seconds of a pulse, and of no torque before and after it.
     PULSE_S = 0.03
@@ -447,7 +447,7 @@ class first_power_run:
 
 
 class friction_evaluate:
-    """`friction/evaluate.py`."""
+    """`mechanics/friction/evaluate.py`."""
 
     # BLOCKS, EVEN: Blocks that a mean is calculated over; a speed that is not held in one of them
     # is uneven.
@@ -481,7 +481,7 @@ class friction_evaluate:
 
 
 class friction_run:
-    """`friction/run.py`."""
+    """`mechanics/friction/run.py`."""
 
     # LEAST_S, LONGEST_S: A plateau lasts so long at least, and no longer for the sake of a whole
     # revolution.
@@ -510,7 +510,7 @@ class friction_run:
 
 
 class health_evaluate:
-    """`health/evaluate.py`."""
+    """`watching/health/evaluate.py`."""
 
     FOLLOWED = 3
     """[count] So many of a kind are followed, the lowest ones: they are the stiffness of the drive
@@ -520,7 +520,7 @@ class health_evaluate:
 
 
 class inertia_evaluation:
-    """`inertia/evaluation.py`."""
+    """`mechanics/inertia/evaluation.py`."""
 
     CUTOFF_HZ = 25.0
     """[Hz] Corner of the smoothing of speed and torque before the regression. Origin: 66bd184e with
@@ -540,7 +540,7 @@ class inertia_evaluation:
 
 
 class inertia_moves:
-    """`inertia/moves.py`."""
+    """`mechanics/inertia/moves.py`."""
 
     RAMP_S = 0.15
     """[s] A ramp shorter than this excites the machine's resonances more than its inertia. Origin:
@@ -587,7 +587,7 @@ class inertia_moves:
 
 
 class inertia_probe:
-    """`inertia/probe.py`."""
+    """`mechanics/inertia/probe.py`."""
 
     DURATION_S = 0.28
     """[s] Length of one torque pulse pair. Origin: 76d84383."""
@@ -634,7 +634,7 @@ class inertia_probe:
 
 
 class inertia_run:
-    """`inertia/run.py`."""
+    """`mechanics/inertia/run.py`."""
 
     END_MARGIN_REV = 0.15
     """[rev] Margin to a taught or found end. Origin: f0621549."""
@@ -647,7 +647,7 @@ class inertia_run:
 
 
 class inertia_soft_loop:
-    """`inertia/soft_loop.py`."""
+    """`mechanics/inertia/soft_loop.py`."""
 
     EXPLAINED = 0.98
     """[ratio] Gains that explain less of the torque of a move (share of its variance) are not the
@@ -657,7 +657,7 @@ class inertia_soft_loop:
 
 
 class jog_cyclic:
-    """`jog/cyclic.py`."""
+    """`moving/jog/cyclic.py`."""
 
     # RENEW_S, LOOK_S
     RENEW_S = 0.05
@@ -673,7 +673,7 @@ class jog_cyclic:
 
 
 class jog_hold:
-    """`jog/hold.py`."""
+    """`moving/jog/hold.py`."""
 
     GAP_S = 0.2
     """[s] Longest time between signs of life before the axis brakes. Origin: d0b2ef4f."""
@@ -684,7 +684,7 @@ class jog_hold:
 
 
 class jog_run:
-    """`jog/run.py`."""
+    """`moving/jog/run.py`."""
 
     PERIOD_S = 0.04
     """[s] Period of target renewals to the drive (20 Hz or faster). Origin: a412d0d6."""
@@ -694,7 +694,7 @@ class jog_run:
 
 
 class gantry_evaluate:
-    """`gantry/evaluate.py`."""
+    """`tuning/gantry/evaluate.py`."""
 
     FIGHT_PERCENT = 10.0
     """[% of rated torque] Both sides of a gantry that press against each other with more are out of
@@ -717,7 +717,7 @@ class gantry_evaluate:
 
 
 class gantry_run:
-    """`gantry/run.py`."""
+    """`tuning/gantry/run.py`."""
 
     # LOWEST_HZ, TOP, LINES: Band of the lines, the upper end as a share of the sample rate, and how
     # many lines there are.
@@ -780,7 +780,7 @@ class gantry_run:
 
 
 class load_side_evaluate:
-    """`load_side/evaluate.py`."""
+    """`mechanics/load_side/evaluate.py`."""
 
     CATALOGUE = 0.05
     """[ratio] What a catalogue states of the motor's inertia may be off by this. Origin:
@@ -788,7 +788,7 @@ class load_side_evaluate:
 
 
 class load_side_run:
-    """`load_side/run.py`."""
+    """`mechanics/load_side/run.py`."""
 
     # USED, FAST, TORQUE_SHARE: Share of the permitted travel to each side, of the permitted speed,
     # and of the torque beyond friction that is used.
@@ -946,7 +946,7 @@ class measuring_waveform:
 
 
 class moves_end_search:
-    """`moves/end_search.py`."""
+    """`moving/moves/end_search.py`."""
 
     # STALL_S, START_S: So long at standstill is an end; the axis' own start is not judged.
     STALL_S = 0.12
@@ -956,7 +956,7 @@ class moves_end_search:
 
 
 class moves_go_back:
-    """`moves/go_back.py`."""
+    """`moving/moves/go_back.py`."""
 
     # NEAR_REV, NEAR: Nearer than the larger of these (turns, share of the travel) is near enough.
     NEAR_REV = 0.02
@@ -988,14 +988,14 @@ class moves_go_back:
 
 
 class moves_homing:
-    """`moves/homing.py`."""
+    """`moving/moves/homing.py`."""
 
     POLL_S = 0.02
     """[s] Period of reading the status word. Origin: a412d0d6."""
 
 
 class moves_identification:
-    """`moves/identification.py`."""
+    """`moving/moves/identification.py`."""
 
     POLL_S = 0.02
     """[s] Period of reading the status word. Origin: a412d0d6."""
@@ -1004,7 +1004,7 @@ class moves_identification:
 
 
 class moves_move:
-    """`moves/move.py`."""
+    """`moving/moves/move.py`."""
 
     POLL_S = 0.02
     """[s] Period of reading the status word. Origin: a412d0d6."""
@@ -1013,14 +1013,14 @@ class moves_move:
 
 
 class moves_procedures:
-    """`moves/procedures.py`."""
+    """`moving/moves/procedures.py`."""
 
     POLL_S = 0.1
     """[s] Period of reading the condition of a wait step. Origin: a412d0d6."""
 
 
 class moves_small_move:
-    """`moves/small_move.py`."""
+    """`moving/moves/small_move.py`."""
 
     # FIRST_INCREMENTS, LONGER: Increments of the first move at most, and by how much the next may
     # be longer.
@@ -1045,7 +1045,7 @@ class moves_small_move:
 
 
 class moves_strokes:
-    """`moves/strokes.py`."""
+    """`moving/moves/strokes.py`."""
 
     # USED, FAST: Share of the permitted travel to each side that is used, and of the permitted
     # speed.
@@ -1066,7 +1066,7 @@ class moves_strokes:
 
 
 class notch_effect:
-    """`notch/effect.py`."""
+    """`tuning/notch/effect.py`."""
 
     # PLACE, LOWEST_HZ, HIGHEST_HZ: Where the notch is tried: share of the sample rate, and limits
     # in Hz.
@@ -1102,7 +1102,7 @@ class notch_effect:
 
 
 class notch_filters:
-    """`notch/filters.py`."""
+    """`tuning/notch/filters.py`."""
 
     UNKNOWN_DEPTH_DB = -40.0
     """[dB] Depth shown for families whose manual prints none; the effect has to be measured.
@@ -1113,7 +1113,7 @@ class notch_filters:
 
 
 class notch_in_loop:
-    """`notch/in_loop.py`."""
+    """`tuning/notch/in_loop.py`."""
 
     HIGHEST_MS = 3.0
     """[ratio] Whatever a notch may be, the loop's sensitivity stays below this while it is tried.
@@ -1132,7 +1132,7 @@ class notch_in_loop:
 
 
 class notch_trials:
-    """`notch/trials.py`."""
+    """`tuning/notch/trials.py`."""
 
     WIDTHS = (0.5, 0.2)
     """[ratio] Widths in shares of the centre (Hz), or level pairs (width, depth). Origin: 7166e5a3
@@ -1151,7 +1151,7 @@ class notch_trials:
 
 
 class shaping_evaluate:
-    """`shaping/evaluate.py`."""
+    """`tuning/shaping/evaluate.py`."""
 
     LEAD_S = 0.1
     """[s] Standstill before the first move of a pair. Origin: docs/slow-vibration.md."""
@@ -1181,7 +1181,7 @@ class shaping_evaluate:
 
 
 class shaping_run:
-    """`shaping/run.py`."""
+    """`tuning/shaping/run.py`."""
 
     BETWEEN_S = 0.2
     """[s] Standstill between two pairs of moves. Origin: docs/slow-vibration.md."""
@@ -1191,7 +1191,7 @@ class shaping_run:
 
 
 class step_evaluate:
-    """`step/evaluate.py`."""
+    """`moving/step/evaluate.py`."""
 
     NOISES = 10.0
     """[ratio] A settling window is so many times the noise at least: what leaves a narrower one is
@@ -1204,7 +1204,7 @@ class step_evaluate:
 
 
 class sweep_evaluation:
-    """`sweep/evaluation.py`."""
+    """`tuning/sweep/evaluation.py`."""
 
     # SLOW_HZ, SLOWER: A current loop is not slower than this, nor than this share of what the drive
     # shows.
@@ -1218,14 +1218,15 @@ class sweep_evaluation:
     delay, which the loop's own torque has to, and that is small on heavy axes. Origin: 7020a899."""
     CUT = 0.25
     """[ratio] With more of its samples at one torque while more was commanded, the drive cuts the
-    torque and no mechanics are looked for; as SATURATED of `autotune/run.py`. Origin: 7166e5a3."""
+    torque and no mechanics are looked for; as SATURATED of `tuning/autotune/run.py`. Origin:
+    7166e5a3."""
     ROUNDS = 3
     """[count] A speed loop's gain and the mechanics are found in turn, so often at most. Origin:
     7bd7faec."""
 
 
 class sweep_play:
-    """`sweep/play.py`."""
+    """`tuning/sweep/play.py`."""
 
     AWAY = 0.15
     """[ratio] Share of the travel from home beyond which nothing more begins. Origin: 347f4a26."""
@@ -1243,7 +1244,7 @@ class sweep_play:
 
 
 class sweep_profile_speed:
-    """`sweep/profile_speed.py`."""
+    """`tuning/sweep/profile_speed.py`."""
 
     RAMP_MS = 0
     """[ms] Ramps that are times may be 0 (003:318); others become as steep as this. Origin:
@@ -1269,7 +1270,7 @@ class sweep_profile_speed:
 
 
 class sweep_velocity_noise:
-    """`sweep/velocity_noise.py`."""
+    """`tuning/sweep/velocity_noise.py`."""
 
     NOISE = (0.2, 0.45)
     """[ratio] Nothing of a slow move is up here, so what is there is noise; shares of the sample
@@ -1282,7 +1283,7 @@ class sweep_velocity_noise:
 
 
 class sweep_speed_injection:
-    """`sweep/speed_injection.py`."""
+    """`tuning/sweep/speed_injection.py`."""
 
     FIRST_RAD_S = 0.3
     """[rad/s] Peak of the first trial in rad/s: even a high gain makes little torque of it. Origin:
@@ -1324,7 +1325,7 @@ class sweep_speed_injection:
 
 
 class sweep_texts:
-    """`sweep/texts.py`: phase margin in deg, gain margin in dB and Ms of a loop."""
+    """`tuning/sweep/texts.py`: phase margin in deg, gain margin in dB and Ms of a loop."""
 
     SOUND = (45.0, 8.0, 2.0)
     """[deg, dB, ratio] A loop is called sound from here. Origin: docs/tuning.md."""
@@ -1333,7 +1334,7 @@ class sweep_texts:
 
 
 class vibration_evaluate:
-    """`vibration/evaluate.py`."""
+    """`watching/vibration/evaluate.py`."""
 
     LOWEST_HZ = 5.0
     """[Hz] Below, a component of the speed is part of what the loop still settles. Origin:
@@ -1379,7 +1380,7 @@ class vibration_evaluate:
 
 
 class vibration_run:
-    """`vibration/run.py`."""
+    """`watching/vibration/run.py`."""
 
     # RANGE, LEAST_RANGE: Fastest over slowest speed where the settings name none; the slowest one
     # is below this share of the fastest.
@@ -1404,7 +1405,7 @@ class vibration_run:
 
 
 class dwell_evaluate:
-    """`dwell/evaluate.py`."""
+    """`moving/dwell/evaluate.py`."""
 
     HARMONICS = 4
     """[count] Multiples of the frequency that are looked for, the first one included. Origin:
@@ -1432,7 +1433,7 @@ class dwell_evaluate:
 
 
 class dwell_run:
-    """`dwell/run.py`."""
+    """`moving/dwell/run.py`."""
 
     # LEAD_S, FADE_S: Standstill before and after, and how long the sine grows and falls.
     LEAD_S = 0.1
@@ -1466,7 +1467,7 @@ class dwell_run:
 
 
 class trend_compare:
-    """`trend/compare.py`."""
+    """`watching/trend/compare.py`."""
 
     FALSE_ALARMS = 0.01
     """[ratio] Probability of a false alarm in one comparison of an axis, for all quantities
@@ -1489,14 +1490,14 @@ class trend_compare:
 
 
 class trend_permission:
-    """`trend/permission.py`."""
+    """`watching/trend/permission.py`."""
 
     KEPT = 50
     """[count] Number of attempts that are stored with a permission. Origin: b68b54c1."""
 
 
 class cycle_evaluate:
-    """`cycle/evaluate.py`."""
+    """`watching/cycle/evaluate.py`."""
 
     FEWEST = 20
     """[count] Smallest number of samples that is evaluated. Origin: 67963fe4."""
@@ -1518,7 +1519,7 @@ class cycle_evaluate:
 
 
 class cycle_run:
-    """`cycle/run.py`."""
+    """`watching/cycle/run.py`."""
 
     SLOW_S = 1.0
     """[s] Interval for reading slowly changing values. Origin: 67963fe4."""
@@ -1527,14 +1528,14 @@ class cycle_run:
 
 
 class cycle_texts:
-    """`cycle/texts.py`."""
+    """`watching/cycle/texts.py`."""
 
     BINS = 24
     """[count] Bins of speed in the drawing of torque over speed. Origin: 67963fe4."""
 
 
 class safety_check_evaluate:
-    """`safety_check/evaluate.py`."""
+    """`watching/safety_check/evaluate.py`."""
 
     LEFT = 0.9
     """[ratio] A speed below this share of the commanded one, for `LASTS_S`, is a sign of the
@@ -1580,7 +1581,7 @@ class safety_check_evaluate:
 
 
 class safety_check_run:
-    """`safety_check/run.py`."""
+    """`watching/safety_check/run.py`."""
 
     LEAD_S = 0.3
     """[s] Time without power before the run, for the noise of the torque. Origin: 653af5ab."""

@@ -7,9 +7,9 @@ from collections.abc import Awaitable, Callable
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.hold import Hold
-from backend.tools.jog.run import JogSettings, jog
+from backend.tools.moving.jog.cyclic import jog_cyclic
+from backend.tools.moving.jog.hold import Hold
+from backend.tools.moving.jog.run import JogSettings, jog
 from benchmarks.stopping.rig import Rig
 
 FAMILIES = ("mms7", "m6l", "r6l", "ep3e", "ds_c")

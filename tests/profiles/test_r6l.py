@@ -10,7 +10,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.foundation.work.jobs import Progress
-from backend.tools.moves.procedures import run_procedure
+from backend.tools.moving.moves.procedures import run_procedure
 from drivers.link import Found
 from profiles import load_profile
 from profiles.check import check

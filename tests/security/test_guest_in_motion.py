@@ -9,7 +9,7 @@ import pytest
 from backend.foundation.people.identity import Actor, Identity, acting
 from backend.foundation.people.rights import Right, Role
 from backend.foundation.work.jobs import Job
-from backend.tools.jog.release import END_OF_ENABLING
+from backend.tools.moving.jog.release import END_OF_ENABLING
 from drivers.cia402 import Mode, State
 from drivers.texts.message import text
 from tests.support.guarded import GuardedServer, begin_motion

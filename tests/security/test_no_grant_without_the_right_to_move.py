@@ -147,4 +147,7 @@ def test_no_request_replaces_a_quick_stop_by_torque_zero(server: GuardedServer) 
             for node in ast.walk(tree)
         ):
             named.add(file.relative_to(root).as_posix())
-    assert named == {"backend/tools/brake/run.py", "backend/tools/first_power/run.py"}
+    assert named == {
+        "backend/tools/mechanics/brake/run.py",
+        "backend/tools/mechanics/first_power/run.py",
+    }

@@ -12,9 +12,9 @@ from sqlalchemy import update
 from backend.foundation.store.database import Store
 from backend.foundation.store.health_tables import HealthBaseline
 from backend.records.library.backup.copy import copy_rows
-from backend.tools.health.result import HealthRound, HealthValue
-from backend.tools.health.settings import HealthSettings
-from backend.tools.trend.records import AxisOf, HealthRecords
+from backend.tools.watching.health.result import HealthRound, HealthValue
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.records import AxisOf, HealthRecords
 from benchmarks.health_trend import fill
 from drivers.errors import NotAllowed
 

@@ -14,12 +14,12 @@ from scipy.signal import lfilter
 from backend.axes.axis.axis import Envelope
 from backend.axes.drive.drive import Drive
 from backend.records.library.measurements import pack
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.inertia.evaluation import InertiaSettings
 from backend.tools.measuring import excite
-from backend.tools.step.evaluate import StepSettings
-from backend.tools.step.run import _demand
-from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.moving.step.evaluate import StepSettings
+from backend.tools.moving.step.run import _demand
+from backend.tools.tuning.sweep.evaluation import SweepSettings
 
 RATE_HZ = 1000.0
 #: Corner of the loop: its −3 dB bandwidth, and a rise time of ln 9 / (2π · 60 Hz).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-from backend.tools.inertia.result import InertiaAnswer, InertiaIntervals
+from backend.tools.mechanics.inertia.result import InertiaAnswer, InertiaIntervals
 from backend.tools.spoken import result_in_language
 from drivers.texts.answers import in_language, sentence, sentences
 from drivers.texts.message import joined, text

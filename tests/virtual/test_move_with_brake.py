@@ -9,9 +9,9 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import brake_opens_s
-from backend.tools.moves.homing import HomingSettings, home
-from backend.tools.moves.move import MoveSettings, SequenceSettings, move, sequence
+from backend.tools.measuring.axis_facts import brake_opens_s
+from backend.tools.moving.moves.homing import HomingSettings, home
+from backend.tools.moving.moves.move import MoveSettings, SequenceSettings, move, sequence
 from benchmarks.stopping import vertical
 from benchmarks.stopping.clock import run_simulated
 from benchmarks.stopping.rig import Rig, free_axis, rig

@@ -17,7 +17,7 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.axes.scales.scale import Origin, ScaleUnknown, Uncertainty
-from backend.tools.jog.cyclic import GeneratorSettings, generate
+from backend.tools.moving.jog.cyclic import GeneratorSettings, generate
 from drivers.virtual.firmware.factory import make_device
 from drivers.virtual.mechanics.rough_feedback import RoughFeedbackSpec
 from profiles import load_profile

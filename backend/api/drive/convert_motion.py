@@ -14,10 +14,10 @@ from backend.axes.motion.travel_unit import REVOLUTIONS, TravelUnit
 from backend.axes.scales.travel_units import travel_unit
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.jog.cyclic import GeneratorSettings
-from backend.tools.jog.run import JogSettings
-from backend.tools.moves.homing import HomingSettings
-from backend.tools.moves.move import MoveSettings, SequenceSettings
+from backend.tools.moving.jog.cyclic import GeneratorSettings
+from backend.tools.moving.jog.run import JogSettings
+from backend.tools.moving.moves.homing import HomingSettings
+from backend.tools.moving.moves.move import MoveSettings, SequenceSettings
 
 #: Speed limit [rpm] of an envelope without a requested speed, above the drive's own limits.
 _SPEED_UNLIMITED_RPM = 20_000.0

@@ -36,7 +36,7 @@ from backend.axes.scales.gear_calculator import GearPlan, Mechanics
 from backend.axes.scales.units import gentlest_ramp_rpm_s
 from backend.records.audit.asked import note_before
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.moves import identification
+from backend.tools.moving.moves import identification
 from drivers.errors import DriveError
 from drivers.texts.message import text
 from profiles.functions import FaultHistory, Functions

@@ -45,8 +45,8 @@ from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from backend.tools import parameters
-from backend.tools.jog import cyclic as cyclic_motion
-from backend.tools.moves import homing, move, procedures
+from backend.tools.moving.jog import cyclic as cyclic_motion
+from backend.tools.moving.moves import homing, move, procedures
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import Text, profile_text, text

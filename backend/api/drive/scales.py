@@ -27,7 +27,7 @@ from backend.records.audit.asked import note_before
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
-from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
+from backend.tools.moving.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from drivers.errors import DriveError
 from drivers.texts.message import Text, joined, text
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from backend.axes.drive.drive import Drive
 from backend.foundation.people.identity import acting_person
 from backend.station.bench import Bench
-from backend.tools.health.result import HealthResult
-from backend.tools.health.settings import HealthSettings
-from backend.tools.trend.records import HealthRecords, axis_of
+from backend.tools.watching.health.result import HealthResult
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.records import HealthRecords, axis_of
 
 
 def records_of(bench: Bench) -> HealthRecords:

@@ -7,9 +7,9 @@ from datetime import datetime, time
 from pydantic import BaseModel, Field
 
 from backend.api.messages.models import Message
-from backend.tools.health.result import HealthValue, Quantity
-from backend.tools.trend.compare import Code, Direction
-from backend.tools.trend.permission import Cause, Outcome, Weekday
+from backend.tools.watching.health.result import HealthValue, Quantity
+from backend.tools.watching.trend.compare import Code, Direction
+from backend.tools.watching.trend.permission import Cause, Outcome, Weekday
 from backend.tools.wire_message import MessageInfo
 
 

@@ -25,11 +25,11 @@ from backend.api.messages.errors import message_of as as_info
 from backend.api.messages.errors import message_or_none
 from backend.api.messages.models import JobInfo
 from backend.api.requests.context import Controlled, Me, TheBench, TheDrive, ThePeople
-from backend.tools.health.result import UNITS
-from backend.tools.trend.compare import Finding
-from backend.tools.trend.permission import Attempt, Permission, next_due
-from backend.tools.trend.records import Baseline, Condition, HealthRow, axis_of
-from backend.tools.trend.words import message_of
+from backend.tools.watching.health.result import UNITS
+from backend.tools.watching.trend.compare import Finding
+from backend.tools.watching.trend.permission import Attempt, Permission, next_due
+from backend.tools.watching.trend.records import Baseline, Condition, HealthRow, axis_of
+from backend.tools.watching.trend.words import message_of
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, text
 

@@ -1,8 +1,8 @@
 """Unattended health checks: on a schedule, or triggered by a controller.
 
 Each needs the standing permission of a person who may move the axis
-(`backend.tools.trend.permission`), and the axis free and at standstill. Otherwise nothing moves,
-and the obstacle is recorded.
+(`backend.tools.watching.trend.permission`), and the axis free and at standstill. Otherwise nothing
+moves, and the obstacle is recorded.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from backend.foundation.store.files import StorageFailed
 from backend.foundation.work.jobs import Job
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.health.settings import HealthSettings
 from backend.tools.registry import BY_KIND
 from backend.tools.thresholds import trend_compare
-from backend.tools.trend.permission import (
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.permission import (
     WINDOW,
     Attempt,
     Cause,
@@ -37,8 +37,8 @@ from backend.tools.trend.permission import (
     require_term,
     why_of,
 )
-from backend.tools.trend.records import Baseline, axis_of
-from backend.tools.trend.words import message_of
+from backend.tools.watching.trend.records import Baseline, axis_of
+from backend.tools.watching.trend.words import message_of
 from drivers.cia402 import State
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed
 from drivers.texts.message import Text, text

@@ -51,7 +51,7 @@ from backend.foundation.people.identity import Actor, Identity, acting, arrived_
 from backend.foundation.people.station import People
 from backend.records.audit.asked import Asked, asked
 from backend.station.bench import Bench
-from backend.tools.jog.release import end_of_jog
+from backend.tools.moving.jog.release import end_of_jog
 from drivers.errors import DriveError
 from drivers.texts.message import Text, text
 from drivers.texts.validation import reason_of

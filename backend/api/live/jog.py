@@ -10,9 +10,9 @@ from backend.api.messages.errors import message_or_none, problem_of, words_of
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.hold import Hold
-from backend.tools.jog.run import jog
+from backend.tools.moving.jog.cyclic import jog_cyclic
+from backend.tools.moving.jog.hold import Hold
+from backend.tools.moving.jog.run import jog
 from drivers.errors import DriveError
 from drivers.texts.answers import message_in
 from drivers.texts.message import Text, text

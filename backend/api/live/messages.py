@@ -26,7 +26,7 @@ from backend.api.drive.models_parameters import ParameterValue
 from backend.api.live.people_messages import PeopleNews, PeopleRequest
 from backend.api.messages.models import JobInfo, LogEntry, Message, Positive, Problem
 from backend.api.station.models import DriveSummary
-from backend.tools.jog.release import ReleaseOfPage
+from backend.tools.moving.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo
 
 # --- page to server -----------------------------------------------------------------

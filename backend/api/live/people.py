@@ -35,7 +35,7 @@ from backend.foundation.people.identity import Identity
 from backend.foundation.people.login.throttle import Bucket
 from backend.foundation.people.station import People
 from backend.station.bench import Bench
-from backend.tools.jog.release import END_OF_ENABLING, end_of_enabling
+from backend.tools.moving.jog.release import END_OF_ENABLING, end_of_enabling
 from drivers.texts.message import prose, text
 
 #: Chat lines of a page: burst, and lines per second; limited so that nobody floods the log.

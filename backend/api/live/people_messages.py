@@ -9,7 +9,7 @@ from pydantic import Field
 
 from backend.api.messages.models import Message
 from backend.foundation.people.rights import Right, Role
-from backend.tools.jog.release import ReleaseOfPage
+from backend.tools.moving.jog.release import ReleaseOfPage
 from backend.tools.wire_message import MessageInfo
 
 Name = Annotated[str, Field(max_length=100)]

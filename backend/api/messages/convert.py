@@ -22,7 +22,7 @@ from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.drives.matching import match_profiles
 from backend.station.drives.monitor import Snapshot
-from backend.tools.moves.procedures import describe
+from backend.tools.moving.moves.procedures import describe
 from backend.tools.spoken import result_in_language
 from drivers import cia402
 from drivers.cia402 import Mode

@@ -30,7 +30,7 @@ from backend.report.gather import (
 from backend.report.store import Format, ReportStore, render
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.trend.records import axis_of
+from backend.tools.watching.trend.records import axis_of
 from drivers.errors import NotAllowed
 from drivers.texts.message import text
 

@@ -39,15 +39,15 @@ from backend.records.library.measurements import BadMeasurement, unpack
 from backend.report.changes import Change
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.autotune import candidates as tune_candidates
-from backend.tools.autotune import gains
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.tool import candidate_info
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import put_back, write_settings
-from backend.tools.notch import filters as notch
-from backend.tools.notch.meaning import meaning_of
-from backend.tools.sweep import evaluation as sweep_evaluation
-from backend.tools.sweep.stored import reevaluated
+from backend.tools.tuning.autotune.design import candidates as tune_candidates
+from backend.tools.tuning.autotune.design import gains
+from backend.tools.tuning.autotune.tool import candidate_info
+from backend.tools.tuning.notch import filters as notch
+from backend.tools.tuning.notch.meaning import meaning_of
+from backend.tools.tuning.sweep import evaluation as sweep_evaluation
+from backend.tools.tuning.sweep.stored import reevaluated
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import joined, reason_of, text

@@ -33,14 +33,14 @@ from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import EXCHANGE_ENDS_S, exchange_for
 from backend.station.recording.service import Recordings
-from backend.tools.autotune.result import AutotuneAnswer
-from backend.tools.health.result import HealthResult
-from backend.tools.health.settings import HealthSettings
 from backend.tools.registry import TOOLS
-from backend.tools.sweep import profile_speed
-from backend.tools.sweep.preview import preview
-from backend.tools.sweep.settings import SweepRequest
 from backend.tools.tool import AnyTool, Run, ToolResult, ToolSettings
+from backend.tools.tuning.autotune.result import AutotuneAnswer
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.tuning.sweep.preview import preview
+from backend.tools.tuning.sweep.settings import SweepRequest
+from backend.tools.watching.health.result import HealthResult
+from backend.tools.watching.health.settings import HealthSettings
 from drivers.errors import DriveError, NotAllowed
 from drivers.texts.message import text
 

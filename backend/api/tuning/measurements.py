@@ -16,9 +16,9 @@ from backend.records.library.measurements import SUFFIX, BadMeasurement, Head, M
 from backend.report.changes import ChangeLog
 from backend.station.bench import Bench
 from backend.station.evaluation import evaluate
-from backend.tools.safety_check.evaluate import reevaluate, signed
-from backend.tools.safety_check.result import SafetyResult
 from backend.tools.spoken import result_in_language
+from backend.tools.watching.safety_check.evaluate import reevaluate, signed
+from backend.tools.watching.safety_check.result import SafetyResult
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.texts import limits
 from drivers.texts.message import language, text

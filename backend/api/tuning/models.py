@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from backend.api.messages.models import Message
-from backend.tools.autotune.result import CandidateInfo
 from backend.tools.results import ToolOutcome
+from backend.tools.tuning.autotune.result import CandidateInfo
 from backend.tools.wire_message import MessageInfo
 
 

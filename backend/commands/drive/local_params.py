@@ -20,7 +20,7 @@ from backend.foundation.store.files import write_atomically
 from backend.records.library import SetLibrary
 from backend.tools import parameters
 from backend.tools.measuring.restore import settle
-from backend.tools.moves import procedures
+from backend.tools.moving.moves import procedures
 from drivers.errors import NotAllowed
 from drivers.texts.message import language
 from profiles.schema import Raw

@@ -218,7 +218,7 @@ async def _teach_here(
     where: Place, increments: int, torque: float, cycle_ms: float, state: Path | None
 ) -> None:
     from backend.axes.axis.cyclic import CyclicSession
-    from backend.tools.moves.small_move import SmallMoveSettings, small_move
+    from backend.tools.moving.moves.small_move import SmallMoveSettings, small_move
 
     async with _axis_at(where, state) as axis:
         session = CyclicSession(axis.drive.ports[0].link, [axis.drive])

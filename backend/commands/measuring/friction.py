@@ -14,7 +14,7 @@ from backend.commands.base.remote import Remote
 from backend.commands.measuring.measure import Answer
 from backend.commands.measuring.tools import CommandExtras, command_of
 from backend.foundation.store.files import write_atomically
-from backend.tools.friction.result import FrictionResult
+from backend.tools.mechanics.friction.result import FrictionResult
 from backend.tools.registry import BY_KIND
 
 _OPTIONS: dict[str, tuple[Any, object]] = {

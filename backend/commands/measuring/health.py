@@ -23,10 +23,10 @@ from backend.commands.base.session import run
 from backend.commands.measuring import health_permission
 from backend.commands.measuring.tools import command_of, lines_of
 from backend.commands.server.keep import Config, Database, station_records
-from backend.tools.health.result import UNITS, HealthResult, Quantity
 from backend.tools.registry import BY_KIND
 from backend.tools.thresholds import trend_compare
-from backend.tools.trend.records import HealthRecords
+from backend.tools.watching.health.result import UNITS, HealthResult, Quantity
+from backend.tools.watching.trend.records import HealthRecords
 from backend.tools.wire_message import MessageInfo
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, language, text

@@ -16,7 +16,7 @@ from backend.api.messages.models import JobInfo
 from backend.commands.base.options import DEFAULT_SERVER, Json, Server
 from backend.commands.base.remote import Remote, remote
 from backend.commands.base.session import run
-from backend.tools.trend.permission import Cause, Outcome
+from backend.tools.watching.trend.permission import Cause, Outcome
 from drivers.errors import NotAllowed
 from drivers.texts.message import Text, language, text
 

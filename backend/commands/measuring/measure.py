@@ -43,7 +43,7 @@ async def exchanging(
     """
     from backend.axes.axis.cyclic_mode import keeping_mode
     from backend.commands.drive.scales import take_taught
-    from backend.tools.sweep import profile_speed
+    from backend.tools.tuning.sweep import profile_speed
 
     assert url is not None, "Where.asked says so"
     async with drive_and_pending(url, station, profile) as (drive, pending):
@@ -78,7 +78,7 @@ async def exchanging_pair(
         NotAllowed: the second station is not a number, or equals the first.
     """
     from backend.commands.drive.scales import take_taught
-    from backend.tools.sweep import profile_speed
+    from backend.tools.tuning.sweep import profile_speed
 
     assert url is not None, "Where.asked says so"
     first, other = stations

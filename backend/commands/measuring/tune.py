@@ -12,9 +12,9 @@ from backend.commands.base.printing import words_of
 from backend.commands.base.remote import Remote
 from backend.commands.measuring.measure import Answer
 from backend.commands.measuring.tools import CommandExtras, command_of
-from backend.tools.autotune.apply import take_back
-from backend.tools.autotune.result import AutotuneAnswer
 from backend.tools.registry import BY_KIND
+from backend.tools.tuning.autotune.apply import take_back
+from backend.tools.tuning.autotune.result import AutotuneAnswer
 
 _OPTIONS: dict[str, tuple[Any, object]] = {
     "apply": (

@@ -38,8 +38,8 @@ class HealthRun(Base):
     measurements: Mapped[dict[str, str]] = mapped_column(JSON)
     """Names of the stored raw data, with their SHA-256."""
     round: Mapped[str] = mapped_column(Text)
-    """`backend.tools.health.result.HealthRound` as JSON. Stored as text: thousands are read for one
-    page, and the model's own parser takes a tenth of the time.
+    """`backend.tools.watching.health.result.HealthRound` as JSON. Stored as text: thousands are
+    read for one page, and the model's own parser takes a tenth of the time.
     """
 
 

@@ -16,7 +16,7 @@ from backend.axes.axis.restoring import (
 from backend.axes.axis.stop.quick_stop import quick_stop_keys, raise_quick_stop_from
 from backend.axes.drive.optional import existing
 from backend.foundation.work.jobs import Progress
-from backend.tools.moves.procedures import run_procedure
+from backend.tools.moving.moves.procedures import run_procedure
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
 from drivers.texts.message import Text, joined, text

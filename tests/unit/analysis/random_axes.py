@@ -12,10 +12,10 @@ import numpy as np
 from drive_sim import TURN, Drive, Mechanics, simulate
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.sweep.evaluation import SweepResult, SweepSettings, evaluate
+from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, evaluate
 
 RATED_NM = 1.27
 #: Most that the axis may do meanwhile: rad, rad/s, Nm.

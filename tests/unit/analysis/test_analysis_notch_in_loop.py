@@ -18,7 +18,7 @@ from backend.analysis.loop.notch_effect import LoopLines, fit_effect_in_loop
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.signal_path.sampled_model import LoopModel
 from backend.analysis.response.signal_path.sampling import SignalPath
-from backend.tools.notch.in_loop import safe_centre_hz
+from backend.tools.tuning.notch.in_loop import safe_centre_hz
 
 TURN = 2 * np.pi
 RATE, STEPS, PERIOD, PERIODS = 2000.0, 10, 1300, 4

@@ -20,12 +20,12 @@ from backend.analysis.response.stated_band import ended_where_unknown
 from backend.analysis.signals.excitation import choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Band
-from backend.tools.sweep import speed_injection
-from backend.tools.sweep.evaluation import SweepSettings, evaluate
+from backend.tools.tuning.sweep import speed_injection
+from backend.tools.tuning.sweep.evaluation import SweepSettings, evaluate
 
 RATE, FINE = 1000.0, 1000
 PATHS = [

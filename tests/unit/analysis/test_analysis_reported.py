@@ -21,10 +21,10 @@ from backend.analysis.response.signal_path.sampling import SignalPath, lag_respo
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.sweep.evaluation import SweepSettings, evaluate
+from backend.tools.tuning.sweep.evaluation import SweepSettings, evaluate
 
 RATE = 1000.0
 

@@ -20,7 +20,7 @@ from backend.analysis.response.frf import Frf
 from backend.analysis.response.signal_path.sampled_model import LoopModel, seen_response
 from backend.analysis.response.signal_path.sampling import SignalPath
 from backend.analysis.signals.line_spectra import Record, collect
-from backend.tools.sweep.evaluation import SweepSettings, evaluate
+from backend.tools.tuning.sweep.evaluation import SweepSettings, evaluate
 
 DRIVE = Drive(
     rated_nm=RATED_NM,

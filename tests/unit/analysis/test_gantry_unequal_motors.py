@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from backend.analysis.coupled.modes import CoupledModes
-from backend.tools.gantry.evaluate import Experiments, Shape, _square_rev, _steady
+from backend.tools.tuning.gantry.evaluate import Experiments, Shape, _square_rev, _steady
 
 SHAPE = Shape(1000.0, 64, 5, 1, 16)
 STIFFNESS_NM_PER_RAD = 3.0

@@ -18,8 +18,8 @@ from backend.analysis.mechanics.load_side_samples import (
     LoadStands,
     unwrapped,
 )
-from backend.tools.load_side.run import Room, planned
-from backend.tools.load_side.settings import LoadSideSettings
+from backend.tools.mechanics.load_side.run import Room, planned
+from backend.tools.mechanics.load_side.settings import LoadSideSettings
 from drivers.errors import OutOfRange
 from tests.unit.analysis.two_sided_axis import RATE_HZ, TURN
 from tests.unit.analysis.two_sided_cases import (

@@ -12,8 +12,8 @@ from backend.analysis.mechanics.load_side import LoadSide, Value, load_side
 from backend.analysis.mechanics.load_side_samples import (
     TwoSides,
 )
-from backend.tools.load_side.run import Plan, Room, planned
-from backend.tools.load_side.settings import LoadSideSettings
+from backend.tools.mechanics.load_side.run import Plan, Room, planned
+from backend.tools.mechanics.load_side.settings import LoadSideSettings
 from tests.unit.analysis.two_sided_axis import RATE_HZ, TURN, Axis, moved
 
 AXES = 52

@@ -16,9 +16,9 @@ from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.axes.axis.axis import Axis
-from backend.tools.autotune import verdict as tune_verdict
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.autotune.verdict import verdict_of
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.verification import verdict as tune_verdict
+from backend.tools.tuning.autotune.verification.verdict import verdict_of
 
 MOTOR, LOAD = 3e-5, 3e-4
 #: A motor with ten times its inertia behind a coupling: 9 Hz on the whole, 220 Hz decoupled.

@@ -9,11 +9,11 @@ import numpy.typing as npt
 import pytest
 
 from backend.analysis.loop.loop_structure import Gains, speed_loop
-from backend.tools.autotune.reference import larger
 from backend.tools.measuring import excite
 from backend.tools.measuring.excite import Room, band_for, loop_reference
 from backend.tools.measuring.waveform import grid
-from backend.tools.sweep.plan import reference_speed
+from backend.tools.tuning.autotune.verification.reference import larger
+from backend.tools.tuning.sweep.plan import reference_speed
 
 RATE = 1000.0
 ROOM = Room(torque_nm=1.27, speed_rad_s=157.0, travel_rad=25.0)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from backend.tools.health.result import HealthRound, HealthValue, Quantity
-from backend.tools.trend.compare import Finding
+from backend.tools.watching.health.result import HealthRound, HealthValue, Quantity
+from backend.tools.watching.trend.compare import Finding
 
 Noise = Callable[[np.random.Generator, int], np.ndarray]
 

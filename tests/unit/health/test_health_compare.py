@@ -11,9 +11,9 @@ import math
 import numpy as np
 import pytest
 
-from backend.tools.health.result import HealthRound, HealthValue, Quantity
 from backend.tools.thresholds import trend_compare
-from backend.tools.trend.compare import compare
+from backend.tools.watching.health.result import HealthRound, HealthValue, Quantity
+from backend.tools.watching.trend.compare import compare
 from tests.unit.health.drawn_checks import (
     SPREAD,
     Noise,

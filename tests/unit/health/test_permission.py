@@ -11,7 +11,7 @@ import pytest
 
 from backend.foundation.store.files import StorageFailed
 from backend.tools.thresholds import trend_permission
-from backend.tools.trend.permission import (
+from backend.tools.watching.trend.permission import (
     Attempt,
     Permission,
     Permissions,

@@ -12,9 +12,9 @@ from backend.foundation.store.database import Store
 from backend.report.compose import compose
 from backend.report.document import Language, Note, Table
 from backend.report.facts import Facts, Identity
-from backend.tools.health.result import HealthRound, HealthValue
-from backend.tools.health.settings import HealthSettings
-from backend.tools.trend.records import AxisOf, Condition, HealthRecords
+from backend.tools.watching.health.result import HealthRound, HealthValue
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.records import AxisOf, Condition, HealthRecords
 
 AXIS = AxisOf("2e1-30-7", "X", "mms7", 0x2E1, 0x30, None, 7)
 SETTINGS = HealthSettings(travel_limit=2, speed_limit=900, torque_limit=80)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from benchmarks._rough_cases import CLASSES, FAMILIES, case_of
 from benchmarks._true_loop import true_loop
 from benchmarks.rough_campaign import Tally, lines_of, table

@@ -20,7 +20,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.tools.sweep import profile_speed
+from backend.tools.tuning.sweep import profile_speed
 from drivers.canopen.frames import SYNC, Frame
 from drivers.canopen.link import CanopenLink
 from drivers.virtual.device import Device

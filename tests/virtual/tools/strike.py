@@ -15,15 +15,20 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.notches import Learning, learn_notches
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
-from backend.tools.inertia.evaluation import InertiaOutcome, InertiaSettings
-from backend.tools.inertia.run import inertia
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.restore import settle
-from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
-from backend.tools.sweep.evaluation import SweepResult, SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaOutcome, InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.tuning.autotune.design.notches import Learning, learn_notches
+from backend.tools.tuning.autotune.run import (
+    AutotuneResult,
+    AutotuneSettings,
+    apply_and_verify,
+    autotune,
+)
+from backend.tools.tuning.notch.meaning import NotchMeaning, meaning_of, remember
+from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Trajectory

@@ -9,11 +9,11 @@ import pytest
 
 from backend.records.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
-from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.measuring.temporary import put_back
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
-from backend.tools.sweep.stored import answer_of
+from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
+from backend.tools.tuning.sweep.stored import answer_of
 from drivers.virtual.wires.netns import Namespace
 from tests.virtual.tools.rig import AMPLE_S, WIDE, bench, errors, mechanics, silent
 

@@ -26,8 +26,10 @@ from backend.foundation.work.jobs import Progress
 from backend.records.library.measurements import unpack
 from backend.station.bench import Bench
 from backend.station.evaluation import recompute
-from backend.tools.autotune import tool
-from backend.tools.autotune.result import (
+from backend.tools.measuring.temporary import write_settings
+from backend.tools.mechanics.inertia.result import InertiaAnswer
+from backend.tools.tuning.autotune import tool
+from backend.tools.tuning.autotune.result import (
     AutotuneAnswer,
     CandidateInfo,
     FiltersInfo,
@@ -37,10 +39,8 @@ from backend.tools.autotune.result import (
     NotchInfo,
     VerifiedInfo,
 )
-from backend.tools.autotune.run import AutotuneSettings
-from backend.tools.inertia.result import InertiaAnswer
-from backend.tools.measuring.temporary import write_settings
-from backend.tools.sweep.result import SweepAnswer
+from backend.tools.tuning.autotune.run import AutotuneSettings
+from backend.tools.tuning.sweep.result import SweepAnswer
 from backend.tools.wire_message import wire_messages
 from drivers.cia402 import State
 from drivers.texts.message import prose, text

@@ -11,16 +11,16 @@ from typing import Any, cast
 
 import pytest
 
-from backend.tools.autotune import notches as tune_notches
-from backend.tools.autotune import run as tuning
-from backend.tools.autotune import verify as tune_verify
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.measuring import excite
-from backend.tools.moves.go_back import go_back
-from backend.tools.notch import effect as notch_effect
-from backend.tools.sweep.evaluation import SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.moving.moves.go_back import go_back
+from backend.tools.tuning.autotune import run as tuning
+from backend.tools.tuning.autotune.design import notches as tune_notches
+from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.autotune.verification import verify as tune_verify
+from backend.tools.tuning.notch import effect as notch_effect
+from backend.tools.tuning.sweep.evaluation import SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, motion_halted
 from drivers.halt import Halted

@@ -13,10 +13,10 @@ from collections.abc import Mapping
 import pytest
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.brake.run import TOOL
-from backend.tools.brake.settings import BrakeSettings
-from backend.tools.sweep import profile_speed
+from backend.tools.mechanics.brake.run import TOOL
+from backend.tools.mechanics.brake.settings import BrakeSettings
 from backend.tools.tool import Run
+from backend.tools.tuning.sweep import profile_speed
 from drivers.cia402 import State
 from drivers.errors import Busy, NotAllowed, OutOfRange
 from drivers.virtual.defects import SLIPS, planted

@@ -20,9 +20,9 @@ import pytest
 from backend.commands.base.restoring import recall
 from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.station.bench import Bench
-from backend.tools.brake.run import TOOL
-from backend.tools.sweep import profile_speed
+from backend.tools.mechanics.brake.run import TOOL
 from backend.tools.tool import Run
+from backend.tools.tuning.sweep import profile_speed
 from tests.support.servo import Servo
 from tests.virtual.tools.direct import STATION, direct
 from tests.virtual.tools.rig import At

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.inertia.run import inertia
-from backend.tools.sweep import profile_speed
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
@@ -179,7 +179,7 @@ async def test_mechanics_of_ds_c_by_its_profile_velocity(ds_c: CanBench) -> None
 
 async def test_inertia_of_ds_c_despite_its_coarse_encoder(ds_c: CanBench) -> None:
     """2500 lines make the reported speed noisy; its regression would be several per cent small."""
-    from backend.tools.inertia.run import InertiaSettings
+    from backend.tools.mechanics.inertia.run import InertiaSettings
 
     async with profile_speed.prepared(ds_c.axis, ds_c.session, WIDE, True):
         settings = InertiaSettings(WIDE, rated_torque_nm=1.27)
@@ -191,7 +191,7 @@ async def test_inertia_of_ds_c_despite_its_coarse_encoder(ds_c: CanBench) -> Non
 @pytest.mark.long
 async def test_inertia_of_a_load_that_the_loop_was_never_tuned_for() -> None:
     """60 times the motor, on a loop that swings at 2.3 Hz: the first moves are weak enough."""
-    from backend.tools.inertia.run import InertiaSettings
+    from backend.tools.mechanics.inertia.run import InertiaSettings
 
     heavy = mechanics((3e-3, 300.0, 0.05), viscous=1e-3, coulomb=0.06)
     async with (

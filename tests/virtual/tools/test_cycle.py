@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from backend.records.recording.writer import RecordingWriter
-from backend.tools.cycle.result import CycleResult
-from backend.tools.cycle.run import TOOL
-from backend.tools.cycle.settings import CycleSettings
 from backend.tools.tool import Run
+from backend.tools.watching.cycle.result import CycleResult
+from backend.tools.watching.cycle.run import TOOL
+from backend.tools.watching.cycle.settings import CycleSettings
 from drivers.errors import NotAllowed
 from drivers.link import ScopeBlock
 from tests.virtual.tools.direct import DirectBench, direct

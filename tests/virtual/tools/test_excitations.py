@@ -9,9 +9,9 @@ import pytest
 from backend.records.library.measurements import pack, unpack
 from backend.station.evaluation import recompute
 from backend.tools.measuring.waveform import Waveform
-from backend.tools.sweep.evaluation import Loop, SweepSettings
-from backend.tools.sweep.run import sweep
-from backend.tools.sweep.stored import answer_of
+from backend.tools.tuning.sweep.evaluation import Loop, SweepSettings
+from backend.tools.tuning.sweep.run import sweep
+from backend.tools.tuning.sweep.stored import answer_of
 from drivers.errors import OutOfRange
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

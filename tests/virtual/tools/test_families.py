@@ -10,17 +10,17 @@ import pytest
 from pydantic import TypeAdapter
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.autotune.result import AutotuneAnswer
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, autotune
-from backend.tools.autotune.tool import answer_of as answer_of_autotune
-from backend.tools.inertia.evaluation import InertiaSettings, answer_of
-from backend.tools.inertia.run import TOOL as INERTIA
-from backend.tools.inertia.run import inertia
 from backend.tools.measuring.temporary import put_back
-from backend.tools.notch.meaning import meaning_of
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings, answer_of
+from backend.tools.mechanics.inertia.run import TOOL as INERTIA
+from backend.tools.mechanics.inertia.run import inertia
 from backend.tools.results import ToolOutcome
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.tuning.autotune.result import AutotuneAnswer
+from backend.tools.tuning.autotune.run import AutotuneResult, AutotuneSettings, autotune
+from backend.tools.tuning.autotune.tool import answer_of as answer_of_autotune
+from backend.tools.tuning.notch.meaning import meaning_of
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import AMPLE_S, WIDE, errors, mechanics, silent

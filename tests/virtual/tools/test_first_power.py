@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.first_power.result import FirstPowerResult
-from backend.tools.first_power.run import TOOL
-from backend.tools.first_power.settings import FirstPowerSettings
+from backend.tools.mechanics.first_power.result import FirstPowerResult
+from backend.tools.mechanics.first_power.run import TOOL
+from backend.tools.mechanics.first_power.settings import FirstPowerSettings
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
 from drivers.virtual.defects import planted

@@ -19,8 +19,8 @@ import pytest
 from backend.api.app import make_app
 from backend.records.recording.writer import RecordingWriter
 from backend.station.bench import Bench
-from backend.tools.autotune.run import AutotuneSettings, autotune
-from backend.tools.autotune.tool import answer_of
+from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.autotune.tool import answer_of
 from tests.unit.recording.support import block, header
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import AMPLE_S, WIDE, mechanics, silent

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backend.tools.friction.result import FrictionResult
-from backend.tools.friction.run import TOOL
 from backend.tools.measuring.recording import bridged
+from backend.tools.mechanics.friction.result import FrictionResult
+from backend.tools.mechanics.friction.run import TOOL
 from backend.tools.tool import Run
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.gantry.run import TOOL
 from backend.tools.tool import Run
+from backend.tools.tuning.gantry.run import TOOL
 from drivers.cia402 import State
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange
 from drivers.halt import HaltCause

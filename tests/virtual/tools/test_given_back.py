@@ -13,7 +13,7 @@ import pytest
 from backend.axes.axis.restoring import RestoreFailed
 from backend.tools.measuring.recording import enabled
 from backend.tools.measuring.restore import settle
-from backend.tools.sweep import profile_speed
+from backend.tools.tuning.sweep import profile_speed
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from tests.support.granted import set_mode

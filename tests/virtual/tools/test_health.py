@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from backend.foundation.store.database import Store
-from backend.tools.trend.compare import compare
-from backend.tools.trend.records import HealthRecords
-from backend.tools.trend.words import message_of
+from backend.tools.watching.trend.compare import compare
+from backend.tools.watching.trend.records import HealthRecords
+from backend.tools.watching.trend.words import message_of
 from drivers.virtual.defects import LOOSE, WORN
 from tests.virtual.tools.set_ups.demo import with_defect
 from tests.virtual.tools.set_ups.health import (

@@ -19,10 +19,10 @@ from backend.api.app import make_app
 from backend.commands.base.remote import Remote
 from backend.commands.measuring import health, measure
 from backend.station.bench import Bench
-from backend.tools.health import run as health_run
-from backend.tools.health.result import HealthRound, HealthValue
-from backend.tools.health.settings import HealthSettings
 from backend.tools.tool import Run
+from backend.tools.watching.health import run as health_run
+from backend.tools.watching.health.result import HealthRound, HealthValue
+from backend.tools.watching.health.settings import HealthSettings
 from drivers.texts.message import speaking
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile

@@ -22,12 +22,12 @@ from backend.api.health.unattended import Unattended
 from backend.foundation.people.station import People
 from backend.station.bench import Bench
 from backend.station.drives.monitor import Snapshot
-from backend.tools.health import run as health_run
-from backend.tools.health.result import HealthRound, HealthValue
-from backend.tools.health.settings import HealthSettings
 from backend.tools.tool import Run
-from backend.tools.trend.permission import WINDOW
-from backend.tools.trend.records import axis_of
+from backend.tools.watching.health import run as health_run
+from backend.tools.watching.health.result import HealthRound, HealthValue
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.permission import WINDOW
+from backend.tools.watching.trend.records import axis_of
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device
 from profiles.loader import load_profile

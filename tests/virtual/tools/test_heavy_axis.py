@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
-from backend.tools.inertia.soft_loop import SoftLoop, soft_loop_of
-from backend.tools.moves.go_back import go_back
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.mechanics.inertia.soft_loop import SoftLoop, soft_loop_of
+from backend.tools.moving.moves.go_back import go_back
 from drivers.link import Trajectory
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics, silent

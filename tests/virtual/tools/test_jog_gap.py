@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 
 from backend.foundation.work.jobs import JobResult
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.hold import GAP_S, RESUME_S, Hold
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import JogSettings
+from backend.tools.moving.jog.cyclic import jog_cyclic
+from backend.tools.moving.jog.hold import GAP_S, RESUME_S, Hold
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import JogSettings
 from drivers.cia402 import State
 from drivers.texts.message import text
 from tests.virtual.tools.direct import DirectBench, direct

@@ -19,7 +19,7 @@ from backend.axes.axis.cyclic_mode import keeping_mode
 from backend.commands.base.restoring import recall
 from backend.commands.base.state import STATE_FOLDER_VARIABLE
 from backend.tools.registry import BY_KIND, TOOLS
-from backend.tools.sweep import profile_speed
+from backend.tools.tuning.sweep import profile_speed
 from drivers.cia402 import Mode
 from drivers.link import Address
 from tests.support.granted import set_mode

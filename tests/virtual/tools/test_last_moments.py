@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
 from backend.tools.measuring.alignment import aligned
 from backend.tools.measuring.interrupted import Interrupted
-from backend.tools.step.evaluate import StepSettings
-from backend.tools.step.run import step_response
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.moving.step.evaluate import StepSettings
+from backend.tools.moving.step.run import step_response
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Address, Trajectory

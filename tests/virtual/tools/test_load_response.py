@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.tools.sweep.result import SweepAnswer
-from backend.tools.sweep.run import TOOL
-from backend.tools.sweep.settings import SweepRequest
 from backend.tools.tool import Run
+from backend.tools.tuning.sweep.result import SweepAnswer
+from backend.tools.tuning.sweep.run import TOOL
+from backend.tools.tuning.sweep.settings import SweepRequest
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import silent

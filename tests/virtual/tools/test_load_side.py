@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.load_side.result import LoadSideResult
-from backend.tools.load_side.run import TOOL
+from backend.tools.mechanics.load_side.result import LoadSideResult
+from backend.tools.mechanics.load_side.run import TOOL
 from drivers.errors import NotAllowed
 from drivers.virtual.defects import WORN_BACKLASH_RAD
 from tests.virtual.tools.direct import direct

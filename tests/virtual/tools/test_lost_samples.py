@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.moves import first_look
-from backend.tools.inertia.probe import probe_axis
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.recording import bridged
-from backend.tools.moves.go_back import go_back
-from backend.tools.sweep import run as sweep_tool
-from backend.tools.sweep.evaluation import Loop, SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.moves import first_look
+from backend.tools.mechanics.inertia.probe import probe_axis
+from backend.tools.moving.moves.go_back import go_back
+from backend.tools.tuning.sweep import run as sweep_tool
+from backend.tools.tuning.sweep.evaluation import Loop, SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.link import ScopeBlock, Trajectory
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.tools.sweep import adaptive as sweep_adaptive
-from backend.tools.sweep import run as sweep_tool
-from backend.tools.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep import adaptive as sweep_adaptive
+from backend.tools.tuning.sweep import run as sweep_tool
+from backend.tools.tuning.sweep.evaluation import SweepSettings
 from drivers.cia402 import State
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics, silent

@@ -10,13 +10,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from backend.tools.autotune import time_budget as tune_time
-from backend.tools.autotune import verify as tune_verify
-from backend.tools.autotune.run import AutotuneSettings, autotune
 from backend.tools.measuring import repeats
-from backend.tools.notch import effect as notch_effect
-from backend.tools.notch import in_loop as notch_in_loop
-from backend.tools.sweep import play as sweep_play
+from backend.tools.tuning.autotune import time_budget as tune_time
+from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.autotune.verification import verify as tune_verify
+from backend.tools.tuning.notch import effect as notch_effect
+from backend.tools.tuning.notch import in_loop as notch_in_loop
+from backend.tools.tuning.sweep import play as sweep_play
 from drivers.cia402 import State
 from tests.virtual.tools import direct as direct_module
 from tests.virtual.tools.direct import DirectBench, direct

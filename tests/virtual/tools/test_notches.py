@@ -14,15 +14,15 @@ from backend.analysis.loop.margins import open_from_closed
 from backend.analysis.loop.notch import Notch
 from backend.analysis.response.signal_path.sampling import Hold
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.gains import plan_gains
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import write_settings
-from backend.tools.notch import effect as notch_effect
-from backend.tools.notch import filters as notch
-from backend.tools.notch.meaning import meaning_of, remember
-from backend.tools.sweep.evaluation import SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.tuning.autotune.design.gains import plan_gains
+from backend.tools.tuning.notch import effect as notch_effect
+from backend.tools.tuning.notch import filters as notch
+from backend.tools.tuning.notch.meaning import meaning_of, remember
+from backend.tools.tuning.sweep.evaluation import SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

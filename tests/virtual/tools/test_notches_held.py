@@ -13,11 +13,11 @@ from dataclasses import replace
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.notch import in_loop as notch_in_loop
-from backend.tools.notch.meaning import NotchMeaning
-from backend.tools.sweep.evaluation import SweepResult, SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.tuning.notch import in_loop as notch_in_loop
+from backend.tools.tuning.notch.meaning import NotchMeaning
+from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import Mode, State
 from drivers.errors import NotAllowed
 from drivers.virtual.mechanics import MechanicsSpec

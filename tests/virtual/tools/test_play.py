@@ -7,10 +7,10 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.plan import check
-from backend.tools.sweep.run import sweep
-from backend.tools.sweep.stored import answer_of
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.plan import check
+from backend.tools.tuning.sweep.run import sweep
+from backend.tools.tuning.sweep.stored import answer_of
 from drivers.errors import OutOfRange
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, errors, mechanics, silent

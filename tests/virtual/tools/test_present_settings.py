@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from backend.tools.autotune.candidates import plan
-from backend.tools.autotune.present import KEPT
 from backend.tools.measuring.temporary import put_back, write_settings
-from backend.tools.notch.meaning import meaning_of
+from backend.tools.tuning.autotune.design.candidates import plan
+from backend.tools.tuning.autotune.present import KEPT
+from backend.tools.tuning.notch.meaning import meaning_of
 from tests.virtual.tools.rig import silent
 from tests.virtual.tools.test_wrong_situations import (
     _FOUND,

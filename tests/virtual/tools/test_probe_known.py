@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.inertia import probe
 from backend.tools.measuring import recording
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.mechanics.inertia import probe
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import WIDE, mechanics
 

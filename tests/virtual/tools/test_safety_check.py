@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from backend.axes.axis.restoring import RestoreFailed
-from backend.tools.safety_check.run import TOOL, plan_of
+from backend.tools.watching.safety_check.run import TOOL, plan_of
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.virtual.firmware.states import State as Firmware
 from tests.virtual.tools.direct import DirectBench, direct

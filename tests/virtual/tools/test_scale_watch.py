@@ -16,19 +16,19 @@ import pytest
 from backend.axes.axis import teaching
 from backend.axes.axis.axis import Envelope
 from backend.axes.scales.scale import Origin, ScaleUnknown, Uncertainty
-from backend.tools.autotune.run import AutotuneSettings, autotune
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
-from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
-from backend.tools.jog.run import Hold, JogSettings, jog
 from backend.tools.measuring.interrupted import Interrupted
-from backend.tools.moves.homing import HomingSettings, home
-from backend.tools.moves.move import MoveSettings, SequenceSettings, move, sequence
-from backend.tools.moves.small_move import SmallMoveSettings, small_move
-from backend.tools.step.evaluate import StepSettings
-from backend.tools.step.run import step_response
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.moving.jog.cyclic import GeneratorSettings, generate, jog_cyclic
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.moves.homing import HomingSettings, home
+from backend.tools.moving.moves.move import MoveSettings, SequenceSettings, move, sequence
+from backend.tools.moving.moves.small_move import SmallMoveSettings, small_move
+from backend.tools.moving.step.evaluate import StepSettings
+from backend.tools.moving.step.run import step_response
+from backend.tools.tuning.autotune.run import AutotuneSettings, autotune
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.errors import MotionHalted, NotAllowed, OutOfRange
 from drivers.halt import HaltCause
 from drivers.virtual.mechanics import MechanicsSpec

@@ -12,9 +12,9 @@ import pytest
 
 from backend.axes.axis import scaled, teaching
 from backend.axes.scales.scale import ScaleChanged, ScaleUnknown
-from backend.tools.first_power.result import FirstPowerResult
 from backend.tools.measuring.recording import enabled
-from backend.tools.moves.small_move import SmallMoveSettings, longest_allowed, small_move
+from backend.tools.mechanics.first_power.result import FirstPowerResult
+from backend.tools.moving.moves.small_move import SmallMoveSettings, longest_allowed, small_move
 from backend.tools.registry import TOOLS
 from backend.tools.tool import AnyTool, Run
 from drivers.cia402 import Mode

@@ -17,8 +17,8 @@ import pytest
 from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.tools.shaping.run import TOOL
 from backend.tools.tool import Run
+from backend.tools.tuning.shaping.run import TOOL
 from drivers.cia402 import State
 from drivers.errors import NotAllowed, OutOfRange
 from drivers.virtual.firmware.factory import make_device

@@ -8,14 +8,14 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.notches import Learning, learn_notches
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.restore import settle
-from backend.tools.sweep import profile_speed
-from backend.tools.sweep.evaluation import SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.tuning.autotune.design.notches import Learning, learn_notches
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.tuning.sweep.evaluation import SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.virtual.wires.netns import Namespace

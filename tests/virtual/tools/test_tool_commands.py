@@ -29,9 +29,9 @@ from backend.commands.base import session
 from backend.commands.base.remote import Remote
 from backend.commands.measuring import measure, report
 from backend.station.bench import Bench
-from backend.tools.friction.result import Code
-from backend.tools.inertia import run as inertia_run
-from backend.tools.inertia.evaluation import InertiaOutcome, InertiaSettings
+from backend.tools.mechanics.friction.result import Code
+from backend.tools.mechanics.inertia import run as inertia_run
+from backend.tools.mechanics.inertia.evaluation import InertiaOutcome, InertiaSettings
 from backend.tools.registry import BY_KIND, TOOLS
 from backend.tools.tool import AnyTool
 from drivers.virtual.firmware.factory import make_device

@@ -13,9 +13,9 @@ import pytest
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.restore import settle
-from backend.tools.sweep import profile_speed
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.run import sweep
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import DriveError, NotAllowed
 from drivers.virtual.wires.netns import Namespace

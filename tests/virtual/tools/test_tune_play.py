@@ -14,12 +14,17 @@ import numpy.typing as npt
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import again as tune_again
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.run import AutotuneResult, AutotuneSettings, apply_and_verify, autotune
-from backend.tools.autotune.tool import answer_of
+from backend.tools.measuring.axis_facts import read_facts
 from backend.tools.measuring.temporary import put_back
-from backend.tools.sweep.evaluation import completed
+from backend.tools.tuning.autotune import again as tune_again
+from backend.tools.tuning.autotune.run import (
+    AutotuneResult,
+    AutotuneSettings,
+    apply_and_verify,
+    autotune,
+)
+from backend.tools.tuning.autotune.tool import answer_of
+from backend.tools.tuning.sweep.evaluation import completed
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import AMPLE_S, WIDE, At, mechanics, settings_of, silent
 

@@ -12,14 +12,14 @@ from typing import Any
 
 import pytest
 
-from backend.tools.dwell.result import DwellResult
-from backend.tools.dwell.run import TOOL as DWELL
-from backend.tools.dwell.settings import DwellSettings
-from backend.tools.sweep import profile_speed
+from backend.tools.moving.dwell.result import DwellResult
+from backend.tools.moving.dwell.run import TOOL as DWELL
+from backend.tools.moving.dwell.settings import DwellSettings
 from backend.tools.tool import AnyTool, Run
-from backend.tools.vibration.result import VibrationResult
-from backend.tools.vibration.run import TOOL as VIBRATION
-from backend.tools.vibration.settings import VibrationSettings
+from backend.tools.tuning.sweep import profile_speed
+from backend.tools.watching.vibration.result import VibrationResult
+from backend.tools.watching.vibration.run import TOOL as VIBRATION
+from backend.tools.watching.vibration.settings import VibrationSettings
 from drivers.cia402 import State
 from drivers.errors import EnvelopeExceeded, NotAllowed, OutOfRange
 from drivers.virtual.mechanics import MechanicsSpec, PlaceSpec, RippleSpec, analytic_response

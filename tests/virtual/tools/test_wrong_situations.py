@@ -17,22 +17,22 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.autotune.run import (
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.measuring.restore import settle
+from backend.tools.measuring.temporary import put_back, write_settings
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.run import inertia
+from backend.tools.moving.step.evaluate import StepSettings
+from backend.tools.moving.step.run import step_response
+from backend.tools.tuning.autotune.run import (
     AutotuneResult,
     AutotuneSettings,
     apply_and_verify,
     autotune,
 )
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.run import inertia
-from backend.tools.measuring.restore import settle
-from backend.tools.measuring.temporary import put_back, write_settings
-from backend.tools.notch.meaning import NotchMeaning, meaning_of, remember
-from backend.tools.step.evaluate import StepSettings
-from backend.tools.step.run import step_response
-from backend.tools.sweep.evaluation import SweepSettings, completed
-from backend.tools.sweep.run import sweep
+from backend.tools.tuning.notch.meaning import NotchMeaning, meaning_of, remember
+from backend.tools.tuning.sweep.evaluation import SweepSettings, completed
+from backend.tools.tuning.sweep.run import sweep
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, NotAllowed
 from drivers.link import Address
@@ -133,7 +133,7 @@ async def test_a_torque_that_the_drive_cuts_is_reported(
     async def unknown(_axis: object) -> float:
         return 400.0
 
-    monkeypatch.setattr("backend.tools.sweep.plan.drive_limit_percent", unknown)
+    monkeypatch.setattr("backend.tools.tuning.sweep.plan.drive_limit_percent", unknown)
     async with unharmed(ONE, family, settings={family.torque_limit: 100}) as b:
         with pytest.raises(DriveError, match="torque"):
             await autotune(b.axis, b.session, family.autotune(), silent())

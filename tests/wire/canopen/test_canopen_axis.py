@@ -14,9 +14,9 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.jog.cyclic import jog_cyclic
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
 from drivers.canopen.link import CanopenLink
 from drivers.cia402 import State
 from drivers.virtual.firmware.factory import make_device

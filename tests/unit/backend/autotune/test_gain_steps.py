@@ -16,11 +16,16 @@ import pytest
 import scipy
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.gain_steps import GainStep, GainSteps, judged, levels_to
-from backend.tools.autotune.result import GainStepsInfo
 from backend.tools.measuring.figures import figures_of
-from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings
+from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings
 from backend.tools.thresholds import autotune_gain_steps as threshold
+from backend.tools.tuning.autotune.result import GainStepsInfo
+from backend.tools.tuning.autotune.verification.gain_steps import (
+    GainStep,
+    GainSteps,
+    judged,
+    levels_to,
+)
 
 FloatArray = npt.NDArray[np.float64]
 SETTINGS = StepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))

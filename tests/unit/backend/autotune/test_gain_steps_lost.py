@@ -12,9 +12,9 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import gain_steps as raising
 from backend.tools.measuring.recording import Recording, bridged
-from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings, evaluate
+from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings, evaluate
+from backend.tools.tuning.autotune.verification import gain_steps as raising
 
 SETTINGS = StepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))
 RATE = 1000.0

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from backend.axes.drive.readings import Reading
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.inertia import probe
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.mechanics.inertia import probe
 from drivers.errors import LinkTimeout
 from drivers.texts.message import text
 

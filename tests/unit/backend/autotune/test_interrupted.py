@@ -14,10 +14,10 @@ import pytest
 
 from backend.analysis.loop.design import Candidate
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import apply as tune_apply
-from backend.tools.autotune import notches as tune_notches
-from backend.tools.autotune import present as tune_present
 from backend.tools.measuring.interrupted import Interrupted, raise_if_ended
+from backend.tools.tuning.autotune import apply as tune_apply
+from backend.tools.tuning.autotune import present as tune_present
+from backend.tools.tuning.autotune.design import notches as tune_notches
 from drivers.cia402 import State
 from drivers.errors import DriveError, LinkLost, MotionHalted, NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, LoopState
@@ -139,8 +139,8 @@ async def test_tuning_goes_on_without_notches_only_where_the_axis_kept_them_back
     monkeypatch.setattr(tune_notches, "go_back", go_back)
     monkeypatch.setattr(tune_notches, "_learn_free", learn)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
-    monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
-    monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
+    monkeypatch.setattr("backend.tools.tuning.notch.effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.tuning.notch.trials.least_s", lambda _drive: 11.6)
     axis: Any = Axis()
     resonant: Any = SimpleNamespace(
         resonances=[SimpleNamespace(kind="resonance")], model=object(), loop="none"

@@ -11,7 +11,12 @@ import pytest
 
 from backend.analysis.loop.loop_structure import Gains, LoopFilters
 from backend.axes.drive.drive import Drive
-from backend.tools.autotune.gains import filter_choices, plan_design, plan_filters, plan_gains
+from backend.tools.tuning.autotune.design.gains import (
+    filter_choices,
+    plan_design,
+    plan_filters,
+    plan_gains,
+)
 from drivers.errors import NotAllowed, OutOfRange
 from profiles.loader import load_profile
 

@@ -10,8 +10,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from backend.tools.notch import effect as notch_effect
-from backend.tools.notch import in_loop as notch_in_loop
+from backend.tools.tuning.notch import effect as notch_effect
+from backend.tools.tuning.notch import in_loop as notch_in_loop
 from drivers.errors import NotAllowed
 
 LINES = np.array([2, 3, 5])

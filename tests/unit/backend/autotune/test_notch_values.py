@@ -19,8 +19,8 @@ from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.notch.filters import encode, off_raw, response
-from backend.tools.notch.meaning import NotchMeaning
+from backend.tools.tuning.notch.filters import encode, off_raw, response
+from backend.tools.tuning.notch.meaning import NotchMeaning
 from drivers.errors import OutOfRange
 from profiles.loader import load_profile
 from profiles.schema import Parameter, Profile

@@ -21,10 +21,15 @@ from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
-from backend.tools.autotune import verdict as tune_verdict
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.autotune.raising import by_raised_gain, raised_to, share_to_show, surely_db
-from backend.tools.autotune.verdict import misses, verdicts_of, worst_of_paths
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.tuning.autotune.verification import verdict as tune_verdict
+from backend.tools.tuning.autotune.verification.raising import (
+    by_raised_gain,
+    raised_to,
+    share_to_show,
+    surely_db,
+)
+from backend.tools.tuning.autotune.verification.verdict import misses, verdicts_of, worst_of_paths
 
 MOTOR, LOAD = 3e-5, 1.8e-4
 #: A motor with six times its inertia behind a coupling: it crosses 0 dB again above 400 Hz, where

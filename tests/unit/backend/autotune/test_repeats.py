@@ -16,14 +16,14 @@ from backend.analysis.loop.notch_effect import NotchEffect
 from backend.axes.axis.axis import Envelope
 from backend.axes.drive.drive import Drive
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import time_budget as tune_time
-from backend.tools.autotune.time_budget import TimeLeft
 from backend.tools.measuring import repeats
 from backend.tools.measuring.computing import meanwhile
 from backend.tools.measuring.repeats import Repeats
-from backend.tools.moves import go_back as go_back_tool
-from backend.tools.notch import effect as notch_effect
-from backend.tools.sweep import play as sweep_play
+from backend.tools.moving.moves import go_back as go_back_tool
+from backend.tools.tuning.autotune import time_budget as tune_time
+from backend.tools.tuning.autotune.time_budget import TimeLeft
+from backend.tools.tuning.notch import effect as notch_effect
+from backend.tools.tuning.sweep import play as sweep_play
 from drivers.errors import NotAllowed
 from profiles.loader import load_profile
 from tests.unit.backend.autotune.test_tune_time import Clock

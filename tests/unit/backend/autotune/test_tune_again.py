@@ -16,15 +16,15 @@ from backend.analysis.loop.measured_plant import MeasuredPlant
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import again as tune_again
-from backend.tools.autotune import apply as tune_apply
-from backend.tools.autotune.again import Again, Designing, Figures, contradictions
-from backend.tools.autotune.apply import Applied
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.autotune.present import Present, Trials
-from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verify import MOST_PAIRS, Check
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.excite import Room, band_for, loop_reference
+from backend.tools.tuning.autotune import again as tune_again
+from backend.tools.tuning.autotune import apply as tune_apply
+from backend.tools.tuning.autotune.again import Again, Designing, Figures, contradictions
+from backend.tools.tuning.autotune.apply import Applied
+from backend.tools.tuning.autotune.present import Present, Trials
+from backend.tools.tuning.autotune.time_budget import TimeLeft
+from backend.tools.tuning.autotune.verification.verify import MOST_PAIRS, Check
 from tests.unit.backend.autotune.test_tune_hum import GOALS, design
 from tests.unit.backend.autotune.test_tune_verify import loop_swept
 

@@ -15,8 +15,8 @@ from backend.analysis.loop.loop_goals import Goals
 from backend.analysis.loop.loop_structure import Gains, LoopFilters
 from backend.analysis.loop.margins import Margins
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import apply as tune_apply
-from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.tuning.autotune import apply as tune_apply
+from backend.tools.tuning.autotune.time_budget import TimeLeft
 from drivers.errors import OutOfRange
 from drivers.texts.message import Text, text
 

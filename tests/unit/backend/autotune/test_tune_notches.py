@@ -12,11 +12,11 @@ import pytest
 from backend.analysis.mechanics.mechanical_model import MechanicalModel, Mode
 from backend.analysis.response.frf import Frf
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import notches as tune_notches
-from backend.tools.autotune.notches import out_of_sight
-from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.notch.meaning import NotchMeaning
-from backend.tools.sweep.evaluation import SweepResult
+from backend.tools.tuning.autotune.design import notches as tune_notches
+from backend.tools.tuning.autotune.design.notches import out_of_sight
+from backend.tools.tuning.autotune.time_budget import TimeLeft
+from backend.tools.tuning.notch.meaning import NotchMeaning
+from backend.tools.tuning.sweep.evaluation import SweepResult
 from drivers.texts.message import Text
 
 
@@ -72,8 +72,8 @@ async def test_notches_are_tried_beside_a_loop_where_the_mechanics_were(
     monkeypatch.setattr(tune_notches, "_learn_free", free)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: None)
     monkeypatch.setattr(tune_notches, "remember", lambda *_: None)
-    monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
-    monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
+    monkeypatch.setattr("backend.tools.tuning.notch.effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.tuning.notch.trials.least_s", lambda _drive: 11.6)
 
     assert await said_of(loop, scheme, gravity_nm) is None
     assert ways == [holds]
@@ -118,7 +118,7 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     """12 s are for the design and its verification; a free axis needs 8.1 of the 11.6 s."""
     known: list[NotchMeaning] = [] if before is None else [before]
     clock = SimpleNamespace(monotonic=lambda: 1000.0)
-    monkeypatch.setattr("backend.tools.autotune.time_budget.time", clock)
+    monkeypatch.setattr("backend.tools.tuning.autotune.time_budget.time", clock)
     monkeypatch.setattr("backend.tools.measuring.repeats.time", clock)
 
     async def free(*given: Any) -> NotchMeaning:
@@ -128,8 +128,8 @@ async def test_notches_are_learned_only_where_a_design_can_be_verified_after_it(
     monkeypatch.setattr(tune_notches, "_learn_free", free)
     monkeypatch.setattr(tune_notches, "meaning_of", lambda _drive: known[-1] if known else None)
     monkeypatch.setattr(tune_notches, "remember", lambda _drive, meaning: known.append(meaning))
-    monkeypatch.setattr("backend.tools.notch.effect.unknown", lambda _drive: True)
-    monkeypatch.setattr("backend.tools.notch.trials.least_s", lambda _drive: 11.6)
+    monkeypatch.setattr("backend.tools.tuning.notch.effect.unknown", lambda _drive: True)
+    monkeypatch.setattr("backend.tools.tuning.notch.trials.least_s", lambda _drive: 11.6)
     left = TimeLeft.of(left_s)
     said = await said_of(time_left=left)
     assert [meaning.centre_hz for meaning in known][-1:] == (

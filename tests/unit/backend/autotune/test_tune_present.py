@@ -10,9 +10,9 @@ import pytest
 
 from backend.analysis.loop.design import Candidate
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import apply as tune_apply
-from backend.tools.autotune import present as tune_present
-from backend.tools.autotune.apply import Applied
+from backend.tools.tuning.autotune import apply as tune_apply
+from backend.tools.tuning.autotune import present as tune_present
+from backend.tools.tuning.autotune.apply import Applied
 from drivers.texts.message import Text
 from tests.unit.backend.autotune.test_tune_hum import GOALS, design
 

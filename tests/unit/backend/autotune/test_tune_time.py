@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import present as tune_present
-from backend.tools.autotune import time_budget as tune_time
-from backend.tools.autotune.apply import Applied
-from backend.tools.autotune.time_budget import TimeLeft
+from backend.tools.tuning.autotune import present as tune_present
+from backend.tools.tuning.autotune import time_budget as tune_time
+from backend.tools.tuning.autotune.apply import Applied
+from backend.tools.tuning.autotune.time_budget import TimeLeft
 from tests.unit.backend.autotune.test_tune_hum import GOALS, design, kept_of
 
 

@@ -15,11 +15,17 @@ from backend.analysis.loop.margins import Margins
 from backend.analysis.response.frf import Frf
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune import verify as tune_verify
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.autotune.time_budget import TimeLeft
-from backend.tools.autotune.verdict import in_words, pieces, reported_lines, sharp_lines
-from backend.tools.autotune.verify import (
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.moving.step.evaluate import LEAD_S, StepResult
+from backend.tools.tuning.autotune.time_budget import TimeLeft
+from backend.tools.tuning.autotune.verification import verify as tune_verify
+from backend.tools.tuning.autotune.verification.verdict import (
+    in_words,
+    pieces,
+    reported_lines,
+    sharp_lines,
+)
+from backend.tools.tuning.autotune.verification.verify import (
     Check,
     Verified,
     bearable,
@@ -30,8 +36,7 @@ from backend.tools.autotune.verify import (
     verify,
     worse_than,
 )
-from backend.tools.step.evaluate import LEAD_S, StepResult
-from backend.tools.sweep.evaluation import SweepResult, SweepSettings
+from backend.tools.tuning.sweep.evaluation import SweepResult, SweepSettings
 
 GUARANTEED = Goals(gain_margin_db=9.0, phase_margin_deg=48.0, ms=1.8)
 

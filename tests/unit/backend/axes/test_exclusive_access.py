@@ -11,7 +11,7 @@ from backend.axes.axis.axis import Axis
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.exclusive import ExclusiveAccessHeld
 from backend.axes.drive.ports import Port
-from backend.tools.moves.procedures import run_procedure
+from backend.tools.moving.moves.procedures import run_procedure
 from drivers.errors import DriveError
 from drivers.link import Address
 from profiles.schema import Procedure, Profile, WaitStep, WriteStep

@@ -12,11 +12,11 @@ from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings, jog
-from backend.tools.moves.move import MoveSettings, move
-from backend.tools.sweep.plan import drive_limit_percent
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.moves.move import MoveSettings, move
+from backend.tools.tuning.sweep.plan import drive_limit_percent
 from drivers.cia402 import Mode
 from drivers.errors import LinkTimeout, NotAllowed, OutOfRange, Rejected
 from tests.support.servo import Servo

@@ -27,9 +27,9 @@ from backend.axes.scales.gear_calculator import Mechanics
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.jog import run as jogging
-from backend.tools.jog.cyclic import _require_inside
-from backend.tools.moves import move as moving
+from backend.tools.moving.jog import run as jogging
+from backend.tools.moving.jog.cyclic import _require_inside
+from backend.tools.moving.moves import move as moving
 from drivers.errors import NotAllowed, OutOfRange
 from tests.support.servo import Servo, bench_with
 

@@ -13,7 +13,7 @@ from backend import cli
 from backend.commands.buses import eeprom
 from backend.commands.measuring import health, response
 from backend.commands.server import preflight
-from backend.tools.health.result import QUANTITIES, HealthValue
+from backend.tools.watching.health.result import QUANTITIES, HealthValue
 from drivers.computer.timing.lateness import Histogram
 from drivers.texts.answers import sentences
 from drivers.texts.message import prose, speaking

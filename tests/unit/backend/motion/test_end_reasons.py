@@ -34,9 +34,9 @@ from backend.records.audit import AuditLog, Fact
 from backend.records.audit.recorder import AuditRecorder
 from backend.records.audit.trail import Filter, Trail
 from backend.station.bench import Bench
-from backend.tools.jog.release import END_OF_ENABLING, END_OF_JOG, Release
-from backend.tools.jog.run import end_of
-from backend.tools.moves.identification import state_of
+from backend.tools.moving.jog.release import END_OF_ENABLING, END_OF_JOG, Release
+from backend.tools.moving.jog.run import end_of
+from backend.tools.moving.moves.identification import state_of
 from drivers.errors import DriveError
 from drivers.texts.message import Language, Text, prose, speaking, text
 from drivers.texts.profile_errors import profile_error_text

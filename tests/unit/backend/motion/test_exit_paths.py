@@ -29,10 +29,10 @@ from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
 from backend.station.measuring import Exchange, exchange_for
-from backend.tools.jog.cyclic import jog_cyclic
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings
-from backend.tools.moves.end_search import limited
+from backend.tools.moving.jog.cyclic import jog_cyclic
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings
+from backend.tools.moving.moves.end_search import limited
 from drivers.cia402 import Mode, State
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.texts.message import Text, text
@@ -610,7 +610,9 @@ async def test_a_measurement_does_not_begin_when_stop_was_pressed_as_its_exchang
         return Exchange(loop, bench, "x", URL, own=True)
 
     monkeypatch.setattr("backend.api.tuning.measure.exchange_for", slowly)
-    monkeypatch.setattr("backend.tools.sweep.profile_speed.require_consent", lambda *_args: None)
+    monkeypatch.setattr(
+        "backend.tools.tuning.sweep.profile_speed.require_consent", lambda *_args: None
+    )
     limits = {"travel_limit": 3, "speed_limit": 300, "torque_limit": 60, "time_limit_s": 20}
     measuring = asyncio.create_task(http.post("/drives/x/jobs/inertia", json=limits))
     await begins.wait()

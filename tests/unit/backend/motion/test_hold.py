@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from backend.tools.jog.hold import CONFIRM_S, GAP_S, RESUME_S, Hold
-from backend.tools.jog.release import END_OF_JOG
+from backend.tools.moving.jog.hold import CONFIRM_S, GAP_S, RESUME_S, Hold
+from backend.tools.moving.jog.release import END_OF_JOG
 from drivers.texts.message import text
 
 #: A page sends a sign every 40 ms; a motion looks at its hold as often.

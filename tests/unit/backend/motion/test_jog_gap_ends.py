@@ -20,8 +20,8 @@ from backend.api.live.messages import JogRenew, JogStart
 from backend.foundation.people.identity import LOCAL, Actor, acting
 from backend.foundation.work.jobs import Job, JobResult, Progress
 from backend.station.bench import Bench
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
 from benchmarks.stopping.clock import run_simulated
 from drivers.errors import Busy
 from drivers.texts.message import text

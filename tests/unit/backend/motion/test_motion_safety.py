@@ -16,11 +16,11 @@ from backend.foundation.people.identity import LOCAL, Actor, acting
 from backend.foundation.work.jobs import Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.jog import run as jogging
-from backend.tools.jog.cyclic import GeneratorSettings, generate, jog_cyclic
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings, jog
-from backend.tools.moves import move as moving
+from backend.tools.moving.jog import run as jogging
+from backend.tools.moving.jog.cyclic import GeneratorSettings, generate, jog_cyclic
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.moves import move as moving
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.texts.message import text

@@ -18,9 +18,9 @@ from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import JobResult, Progress
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from backend.tools.jog.release import END_OF_JOG
-from backend.tools.jog.run import Hold, JogSettings, jog
-from backend.tools.moves.move import MoveSettings, move
+from backend.tools.moving.jog.release import END_OF_JOG
+from backend.tools.moving.jog.run import Hold, JogSettings, jog
+from backend.tools.moving.moves.move import MoveSettings, move
 from benchmarks.stopping.clock import run_simulated
 from drivers.cia402 import Mode, State
 from drivers.errors import DriveError

@@ -30,7 +30,7 @@ from backend.report.render.plot import Area, Curve, Label, Line, Plot, draw
 from backend.report.render.plot import Path as Stroke
 from backend.report.store import ReportStore
 from backend.report.texts import TEXTS
-from backend.tools.sweep.result import SweepAnswer
+from backend.tools.tuning.sweep.result import SweepAnswer
 from drivers.errors import NotAllowed
 from drivers.texts.message import prose
 from tests.support import measurements as known

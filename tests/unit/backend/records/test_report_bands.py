@@ -17,9 +17,9 @@ from backend.report.facts import Measured
 from backend.report.gather import measured_from
 from backend.report.texts import Words
 from backend.report.tools import verdict_of
-from backend.tools.autotune.result import AutotuneAnswer, VerdictInfo, VerifiedInfo
 from backend.tools.registry import BY_KIND
-from backend.tools.sweep.result import SweepAnswer
+from backend.tools.tuning.autotune.result import AutotuneAnswer, VerdictInfo, VerifiedInfo
+from backend.tools.tuning.sweep.result import SweepAnswer
 from tests.support import measurements as known
 
 GOALS = {"gain_margin_db": 9.5, "phase_margin_deg": 46.0, "ms": 1.7}

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.jog.cyclic import GeneratorSettings, signal
+from backend.tools.moving.jog.cyclic import GeneratorSettings, signal
 from drivers.errors import OutOfRange
 
 CYCLE_S = 1e-3

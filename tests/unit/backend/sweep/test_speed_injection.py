@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
 from backend.tools.measuring.waveform import Band
-from backend.tools.sweep import speed_injection
-from backend.tools.sweep.adaptive import _more_informative
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.plan import Setup
+from backend.tools.tuning.sweep import speed_injection
+from backend.tools.tuning.sweep.adaptive import _more_informative
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.plan import Setup
 
 RATE, BAND = 1000.0, Band(5.0, 400.0)
 #: 1.27 Nm and 1500 rpm, of which 35 % of the torque are wanted for the excitation.

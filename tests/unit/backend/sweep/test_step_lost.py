@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.verify import restless
-from backend.tools.health import run as health
-from backend.tools.health.settings import HealthSettings
 from backend.tools.measuring.recording import Recording, bridged
-from backend.tools.step.evaluate import LEAD_S, StepResult, StepSettings, answer_of, evaluate
-from backend.tools.step.texts import TEXTS, report
+from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings, answer_of, evaluate
+from backend.tools.moving.step.texts import TEXTS, report
+from backend.tools.tuning.autotune.verification.verify import restless
+from backend.tools.watching.health import run as health
+from backend.tools.watching.health.settings import HealthSettings
 
 RATE = 1000.0
 SETTINGS = StepSettings(Envelope(4.0, 1500.0, 100.0, 60.0))

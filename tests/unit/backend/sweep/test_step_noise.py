@@ -11,15 +11,15 @@ import numpy.typing as npt
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.gain_steps import judged
 from backend.tools.measuring.recording import Recording
-from backend.tools.step.evaluate import (
+from backend.tools.moving.step.evaluate import (
     LEAD_S,
     StepResult,
     StepSettings,
     evaluate,
     significant_size,
 )
+from backend.tools.tuning.autotune.verification.gain_steps import judged
 
 RATE, TAU_S = 1000.0, 1 / (2 * np.pi * 65.0)
 ENVELOPE = Envelope(4.0, 1500.0, 100.0, 60.0)

@@ -8,8 +8,8 @@ import pytest
 from backend.axes.axis.axis import Envelope
 from backend.tools.measuring import excite
 from backend.tools.measuring.waveform import Band, Waveform, stepped, tones_hz
-from backend.tools.sweep.evaluation import Kind, Loop, SweepSettings
-from backend.tools.sweep.preview import _extremes, _seen, _sequences
+from backend.tools.tuning.sweep.evaluation import Kind, Loop, SweepSettings
+from backend.tools.tuning.sweep.preview import _extremes, _seen, _sequences
 
 RATE_HZ, INERTIA = 1000.0, 2e-4
 ROOM = excite.Room(torque_nm=1.0, speed_rad_s=125.0, travel_rad=19.0)

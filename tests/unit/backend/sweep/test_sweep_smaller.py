@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.interrupted import Interrupted
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.plan import Setup, sequences_of
-from backend.tools.sweep.play import _smaller, _too_much
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.plan import Setup, sequences_of
+from backend.tools.tuning.sweep.play import _smaller, _too_much
 from drivers.errors import NotAllowed, motion_halted
 from drivers.halt import HaltCause, Halted, Quantity
 

@@ -10,13 +10,13 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import AxisFacts
 from backend.tools.measuring import excite
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.sweep import play as sweep_play
-from backend.tools.sweep import speed_injection
-from backend.tools.sweep.evaluation import SweepSettings
-from backend.tools.sweep.plan import Setup
+from backend.tools.tuning.sweep import play as sweep_play
+from backend.tools.tuning.sweep import speed_injection
+from backend.tools.tuning.sweep.evaluation import SweepSettings
+from backend.tools.tuning.sweep.plan import Setup
 from drivers.errors import NotAllowed
 
 ROOM = excite.Room(1.27, 157.0, 25.0)

@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.brake.evaluate import Phase, Trial, Trials, evaluate, reevaluate
-from backend.tools.brake.result import BrakeResult
-from backend.tools.brake.run import _Catch, _placed, sequence
-from backend.tools.brake.settings import BrakeSettings
-from backend.tools.brake.texts import TEXTS, report
+from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.mechanics.brake.evaluate import Phase, Trial, Trials, evaluate, reevaluate
+from backend.tools.mechanics.brake.result import BrakeResult
+from backend.tools.mechanics.brake.run import _Catch, _placed, sequence
+from backend.tools.mechanics.brake.settings import BrakeSettings
+from backend.tools.mechanics.brake.texts import TEXTS, report
 from drivers.link import ScopeBlock
 
 RATE, RATED_NM, TEST = 1000.0, 2.0, 100.0

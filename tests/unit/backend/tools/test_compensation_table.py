@@ -9,7 +9,7 @@ import pytest
 
 from backend.axes.axis.axis import Axis
 from backend.commands.measuring.friction import _here, _lines
-from backend.tools.friction.result import FrictionResult
+from backend.tools.mechanics.friction.result import FrictionResult
 
 NOTHING = FrictionResult.model_validate(
     {

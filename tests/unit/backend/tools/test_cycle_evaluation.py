@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from backend.analysis.duty.load import Signals
-from backend.tools.cycle.evaluate import CycleFacts, Samples, evaluate, meta_of, reevaluate
-from backend.tools.cycle.result import Code, CycleResult
-from backend.tools.cycle.run import TOOL
-from backend.tools.cycle.settings import CycleSettings
-from backend.tools.cycle.texts import TEXTS
+from backend.tools.watching.cycle.evaluate import CycleFacts, Samples, evaluate, meta_of, reevaluate
+from backend.tools.watching.cycle.result import Code, CycleResult
+from backend.tools.watching.cycle.run import TOOL
+from backend.tools.watching.cycle.settings import CycleSettings
+from backend.tools.watching.cycle.texts import TEXTS
 from drivers.errors import NotAllowed
 
 FACTS = CycleFacts(2.0, 3000.0, 300.0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.tools.dwell.evaluate import Dwelt, evaluate
-from backend.tools.dwell.run import require_long_enough
-from backend.tools.dwell.settings import DwellSettings
 from backend.tools.measuring.recording import Recording
+from backend.tools.moving.dwell.evaluate import Dwelt, evaluate
+from backend.tools.moving.dwell.run import require_long_enough
+from backend.tools.moving.dwell.settings import DwellSettings
 from drivers.errors import OutOfRange
 
 RATE = 1000.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.tools.inertia.moves import _stood
 from backend.tools.measuring.recording import Recording
+from backend.tools.mechanics.inertia.moves import _stood
 
 RATE = 1000.0
 

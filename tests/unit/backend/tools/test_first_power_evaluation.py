@@ -8,7 +8,7 @@ from typing import Literal
 
 import pytest
 
-from backend.tools.first_power.evaluate import (
+from backend.tools.mechanics.first_power.evaluate import (
     Seen,
     arrays_of,
     covered_pole_pairs,
@@ -18,9 +18,9 @@ from backend.tools.first_power.evaluate import (
     fits_again,
     reevaluate,
 )
-from backend.tools.first_power.result import FirstPowerResult, Pulse
-from backend.tools.first_power.settings import FirstPowerSettings
-from backend.tools.first_power.texts import TEXTS, notes
+from backend.tools.mechanics.first_power.result import FirstPowerResult, Pulse
+from backend.tools.mechanics.first_power.settings import FirstPowerSettings
+from backend.tools.mechanics.first_power.texts import TEXTS, notes
 
 ASKED = FirstPowerSettings(nothing_hangs=True)
 SEEN = Seen("2026-01-01T00:00:00+00:00", supply_v=48.0, counts_per_rev=8388608.0)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from backend.tools.gantry import run as gantry
-from backend.tools.gantry.settings import GantrySettings
+from backend.tools.tuning.gantry import run as gantry
+from backend.tools.tuning.gantry.settings import GantrySettings
 from drivers.errors import NotAllowed
 
 SETTINGS = GantrySettings(travel_limit=3.0, speed_limit=600.0, torque_limit=60.0, partner="second")

@@ -11,9 +11,9 @@ import pytest
 from backend.analysis.mechanics.slow_moves.identification_path import MoveLimits, design_moves
 from backend.analysis.mechanics.slow_moves.inertia import InertiaResult
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.inertia.evaluation import InertiaSettings, _loop_gain, evaluate
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings, _loop_gain, evaluate
 
 J, COULOMB, VISCOUS = 4e-4, 0.03, 3e-4
 RATE, STEPS = 1000.0, 20

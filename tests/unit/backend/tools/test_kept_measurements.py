@@ -12,14 +12,14 @@ import pytest
 
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
-from backend.tools.autotune.axis_facts import AxisFacts
-from backend.tools.inertia import run as inertia_run
-from backend.tools.inertia.evaluation import InertiaSettings
-from backend.tools.inertia.moves import FirstLook
-from backend.tools.inertia.probe import RoughFit
+from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import Recording
-from backend.tools.step import run as step_run
-from backend.tools.step.evaluate import StepSettings
+from backend.tools.mechanics.inertia import run as inertia_run
+from backend.tools.mechanics.inertia.evaluation import InertiaSettings
+from backend.tools.mechanics.inertia.moves import FirstLook
+from backend.tools.mechanics.inertia.probe import RoughFit
+from backend.tools.moving.step import run as step_run
+from backend.tools.moving.step.evaluate import StepSettings
 from drivers.errors import LinkLost, NotAllowed, OutOfRange
 
 FACTS = AxisFacts(1.27, True, None, None, None, None, None, True)

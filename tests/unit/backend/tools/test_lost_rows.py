@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.tools.safety_check.run import held
+from backend.tools.watching.safety_check.run import held
 from drivers.cia402 import State, decode_state
 
 

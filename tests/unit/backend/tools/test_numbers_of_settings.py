@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from backend.tools.moving.step.settings import StepRequest
 from backend.tools.registry import TOOLS
-from backend.tools.step.settings import StepRequest
 from backend.tools.tool import AnyTool
 
 LIMITS = {"travel_limit": 0.1, "speed_limit": 100.0, "torque_limit": 5.0}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.tools.inertia.probe import Probed, _judged
 from backend.tools.measuring import excite
 from backend.tools.measuring.recording import Recording
+from backend.tools.mechanics.inertia.probe import Probed, _judged
 from drivers.errors import NotAllowed
 
 RATE, STEPS, RATED = 1000.0, 20, 1.27

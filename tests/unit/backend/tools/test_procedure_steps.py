@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from backend.tools.moves.procedures import describe
+from backend.tools.moving.moves.procedures import describe
 from profiles.schema import Procedure
 
 _PROCEDURE = Procedure.model_validate(

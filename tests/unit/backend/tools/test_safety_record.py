@@ -13,10 +13,10 @@ import pytest
 from backend.api.app import make_app
 from backend.report.gather import choose
 from backend.station.bench import Bench
-from backend.tools.safety_check.evaluate import Trace, evaluate, reevaluate, signed
-from backend.tools.safety_check.result import SafetyResult
-from backend.tools.safety_check.run import TOOL
-from backend.tools.safety_check.settings import SafetySettings
+from backend.tools.watching.safety_check.evaluate import Trace, evaluate, reevaluate, signed
+from backend.tools.watching.safety_check.result import SafetyResult
+from backend.tools.watching.safety_check.run import TOOL
+from backend.tools.watching.safety_check.settings import SafetySettings
 
 RATE, RPM, AT = 1000.0, 300.0, 1500
 ASKED = SafetySettings(travel_limit=60, speed_limit=900, torque_limit=100, speed_rpm=RPM,

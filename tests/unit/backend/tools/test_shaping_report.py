@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from backend.commands.measuring.tools import lines_of
-from backend.tools.shaping.result import (
+from backend.tools.tuning.shaping.result import (
     Code,
     DesignedShaper,
     DriveFilter,
@@ -22,8 +22,8 @@ from backend.tools.shaping.result import (
     ShapingResult,
     Verdict,
 )
-from backend.tools.shaping.run import TOOL
-from backend.tools.shaping.settings import ShapingSettings
+from backend.tools.tuning.shaping.run import TOOL
+from backend.tools.tuning.shaping.settings import ShapingSettings
 from profiles.loader import load_profile
 
 MODE = ShapingMode(

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
-from backend.tools.brake.result import BrakeResult
-from backend.tools.brake.run import TOOL
-from backend.tools.brake.settings import BrakeSettings
-from backend.tools.sweep import profile_speed
+from backend.tools.mechanics.brake.result import BrakeResult
+from backend.tools.mechanics.brake.run import TOOL
+from backend.tools.mechanics.brake.settings import BrakeSettings
 from backend.tools.tool import Run
+from backend.tools.tuning.sweep import profile_speed
 from drivers.cia402 import State
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench, direct

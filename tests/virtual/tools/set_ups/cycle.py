@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from backend.axes.axis.axis import Envelope
-from backend.tools.autotune.axis_facts import read_facts
-from backend.tools.inertia.moves import speed_move
+from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.mechanics.inertia.moves import speed_move
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench
 

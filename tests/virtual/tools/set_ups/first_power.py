@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from backend.axes.axis.cyclic_mode import keeping_mode
-from backend.tools.first_power.result import FirstPowerResult
-from backend.tools.first_power.run import TOOL
-from backend.tools.first_power.settings import FirstPowerSettings
+from backend.tools.mechanics.first_power.result import FirstPowerResult
+from backend.tools.mechanics.first_power.run import TOOL
+from backend.tools.mechanics.first_power.settings import FirstPowerSettings
 from backend.tools.tool import Run
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.mechanics import MechanicsSpec, PhaseSpec

@@ -13,11 +13,11 @@ import numpy as np
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
-from backend.tools.friction.result import FrictionResult
-from backend.tools.friction.run import TOOL
-from backend.tools.friction.settings import FrictionSettings
-from backend.tools.sweep import profile_speed
+from backend.tools.mechanics.friction.result import FrictionResult
+from backend.tools.mechanics.friction.run import TOOL
+from backend.tools.mechanics.friction.settings import FrictionSettings
 from backend.tools.tool import Run
+from backend.tools.tuning.sweep import profile_speed
 from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec, RippleSpec, friction_nm
 from tests.virtual.tools.can_rig import can_bench, incremental
 from tests.virtual.tools.direct import direct

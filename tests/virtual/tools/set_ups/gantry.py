@@ -14,12 +14,12 @@ from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
-from backend.tools.gantry.result import GantryResult
-from backend.tools.gantry.run import TOOL
-from backend.tools.gantry.settings import GantrySettings
 from backend.tools.measuring.temporary import make_effective
-from backend.tools.sweep.profile_speed import prepared
 from backend.tools.tool import Run
+from backend.tools.tuning.gantry.result import GantryResult
+from backend.tools.tuning.gantry.run import TOOL
+from backend.tools.tuning.gantry.settings import GantrySettings
+from backend.tools.tuning.sweep.profile_speed import prepared
 from drivers.ethercat.link import EthercatLink
 from drivers.virtual.defects import Defect
 from drivers.virtual.mechanics import GantrySpec, MechanicsSpec

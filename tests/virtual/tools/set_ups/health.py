@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from backend.tools.health.result import HealthResult
-from backend.tools.health.run import TOOL
-from backend.tools.health.settings import HealthSettings
 from backend.tools.tool import Arrays, Meta, Run
-from backend.tools.trend.compare import Finding
-from backend.tools.trend.records import AxisOf
+from backend.tools.watching.health.result import HealthResult
+from backend.tools.watching.health.run import TOOL
+from backend.tools.watching.health.settings import HealthSettings
+from backend.tools.watching.trend.compare import Finding
+from backend.tools.watching.trend.records import AxisOf
 from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec
 from tests.virtual.tools.direct import direct
 from tests.virtual.tools.rig import mechanics, silent

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from backend.tools.load_side.result import LoadSideResult
-from backend.tools.load_side.run import TOOL
-from backend.tools.load_side.settings import LoadSideSettings
+from backend.tools.mechanics.load_side.result import LoadSideResult
+from backend.tools.mechanics.load_side.run import TOOL
+from backend.tools.mechanics.load_side.settings import LoadSideSettings
 from backend.tools.tool import Run
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from backend.axes.axis.cyclic_mode import keeping_mode
-from backend.tools.safety_check.result import SafetyResult
-from backend.tools.safety_check.run import TOOL
-from backend.tools.safety_check.settings import SafetySettings
 from backend.tools.tool import Run
+from backend.tools.watching.safety_check.result import SafetyResult
+from backend.tools.watching.safety_check.run import TOOL
+from backend.tools.watching.safety_check.settings import SafetySettings
 from drivers.cia402 import State
 from drivers.virtual.firmware.states import State as Firmware
 from tests.virtual.tools.direct import DirectBench

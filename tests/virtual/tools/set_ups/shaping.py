@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from backend.tools.shaping.result import ShapingResult
-from backend.tools.shaping.run import TOOL
-from backend.tools.shaping.settings import ShapingSettings
-from backend.tools.sweep import profile_speed
 from backend.tools.tool import Run
+from backend.tools.tuning.shaping.result import ShapingResult
+from backend.tools.tuning.shaping.run import TOOL
+from backend.tools.tuning.shaping.settings import ShapingSettings
+from backend.tools.tuning.sweep import profile_speed
 from drivers.virtual.mechanics import MechanicsSpec
 from tests.virtual.tools.direct import DirectBench
 from tests.virtual.tools.rig import silent

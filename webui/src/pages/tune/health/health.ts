@@ -1,6 +1,6 @@
 import type { AxisHealth, HealthFinding, HealthRunInfo } from '../../../api/schema'
 
-/** Rounds that a baseline takes at least, as in `backend/tools/trend/compare.py`. */
+/** Rounds that a baseline takes at least, as in `backend/tools/watching/trend/compare.py`. */
 export const LEAST_ROUNDS = 3
 /** Rounds of a check that is compared. */
 export const CHECK_ROUNDS = 2

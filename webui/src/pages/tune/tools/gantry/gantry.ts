@@ -43,7 +43,7 @@ export function candidatesOf(
   return [...found.filter((each) => !each.missing), ...found.filter((each) => each.missing)]
 }
 
-/** As `backend/tools/gantry/texts.py` has them. */
+/** As `backend/tools/tuning/gantry/texts.py` has them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
   not_coupled: 'warn',
   square: 'good',

@@ -9,7 +9,7 @@ const TONES: Partial<Record<string, ShownNote['tone']>> = {
 }
 const ORDERS = 6
 
-/** The verdict first, as `backend/tools/load_side/texts.py` has it. */
+/** The verdict first, as `backend/tools/mechanics/load_side/texts.py` has it. */
 export function loadSideNotes(result: LoadSideResult, text: Text): ShownNote[] {
   return result.findings.map((each) => ({
     words: text(`finding.${each.code}`, {

@@ -2,7 +2,7 @@ import type { SafetyResult } from '../../../../api/schema'
 import type { ShownNote, ShownRow, Text } from '../form/shown'
 import { engineering } from '../../steps/steps'
 
-/** The verdict first, as `backend/tools/safety_check/texts.py` has it; always that it is no certificate. */
+/** The verdict first, as `backend/tools/watching/safety_check/texts.py` has it; always that it is no certificate. */
 export function notesOf(result: SafetyResult, text: Text): ShownNote[] {
   const { verdict, obstacle, sign, signature } = result
   const speed =

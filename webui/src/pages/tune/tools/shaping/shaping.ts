@@ -19,7 +19,7 @@ const WARNS: ReadonlySet<string> = new Set([
   'wide_mode',
 ])
 
-/** The verdict first, then the findings, as `backend/tools/shaping/texts.py` has them. */
+/** The verdict first, then the findings, as `backend/tools/tuning/shaping/texts.py` has them. */
 export function shapingNotes(result: ShapingResult, text: Text): ShownNote[] {
   const found = result.comparison
   const words = text(`verdict.${result.verdict}`, {

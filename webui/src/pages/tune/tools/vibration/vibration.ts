@@ -9,7 +9,7 @@ import {
 } from '../form/shown'
 import { engineering } from '../../steps/steps'
 
-/** As `backend/tools/vibration/texts.py` and `backend/tools/dwell/texts.py` have them. */
+/** As `backend/tools/watching/vibration/texts.py` and `backend/tools/moving/dwell/texts.py` have them. */
 const TONES: Partial<Record<string, ShownNote['tone']>> = {
   resonance: 'warn',
   fixed_frequency: 'warn',

@@ -1,0 +1,1 @@
+"""Survey, aliases, firmware and EEPROM of EtherCAT segments: routes and models."""

@@ -1,0 +1,1 @@
+"""Frequency response and what is set by it: sweep, notches, shaping, gantry and autotune."""

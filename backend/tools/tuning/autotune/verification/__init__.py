@@ -1,0 +1,1 @@
+"""Measurement of a tuned loop: its reference, steps of its gain, and the verdict."""
