@@ -5021,7 +5021,7 @@ export interface components {
              * Findings
              * @default []
              */
-            findings: components["schemas"]["backend__tools__cycle__result__Finding"][];
+            findings: components["schemas"]["backend__tools__watching__cycle__result__Finding"][];
             heat: components["schemas"]["CycleHeat"] | null;
             /** Highest Speed Rpm */
             highest_speed_rpm: number;
@@ -6451,7 +6451,7 @@ export interface components {
             /** Curve Speed Rpm */
             curve_speed_rpm: number[];
             /** Findings */
-            findings: components["schemas"]["backend__tools__friction__result__Finding"][];
+            findings: components["schemas"]["backend__tools__mechanics__friction__result__Finding"][];
             /**
              * Harmonics
              * @description largest first
@@ -9082,7 +9082,7 @@ export interface components {
             /** @description transmission error, peak to peak */
             error_span_deg: components["schemas"]["Estimate"];
             /** Findings */
-            findings: components["schemas"]["backend__tools__load_side__result__Finding"][];
+            findings: components["schemas"]["backend__tools__mechanics__load_side__result__Finding"][];
             /** Gear Ratio */
             gear_ratio: number;
             /** @description at the motor shaft */
@@ -14027,27 +14027,9 @@ export interface components {
         };
         /**
          * Finding
-         * @description Something that limits the validity of the result, or a recommended action.
-         */
-        backend__tools__cycle__result__Finding: {
-            /**
-             * Code
-             * @enum {string}
-             */
-            code: "no_period" | "few_periods" | "slow_sampling" | "gaps" | "peak_beyond" | "peak_reached" | "peak_unknown" | "speed_beyond_rated" | "rated_speed_unknown" | "rated_torque_unknown" | "time_constant_unknown" | "overload_unknown" | "overload_exceeded" | "ambient_needs_rise";
-            /**
-             * Unit
-             * @default
-             */
-            unit: string;
-            /** Value */
-            value?: number | null;
-        };
-        /**
-         * Finding
          * @description A result or limitation of the map: a code and the figure that it rests on.
          */
-        backend__tools__friction__result__Finding: {
+        backend__tools__mechanics__friction__result__Finding: {
             /**
              * Code
              * @enum {string}
@@ -14066,12 +14048,30 @@ export interface components {
          * Finding
          * @description A result or limitation of the measurement: a code and the figure that it rests on.
          */
-        backend__tools__load_side__result__Finding: {
+        backend__tools__mechanics__load_side__result__Finding: {
             /**
              * Code
              * @enum {string}
              */
             code: "measured" | "flank_kept" | "backlash_not_seen" | "stiffness_not_seen" | "motor_inertia_unknown" | "rated_torque_unknown" | "load_light" | "pull_large" | "setpoints_held" | "revolution_not_covered";
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
+            /** Value */
+            value?: number | null;
+        };
+        /**
+         * Finding
+         * @description Something that limits the validity of the result, or a recommended action.
+         */
+        backend__tools__watching__cycle__result__Finding: {
+            /**
+             * Code
+             * @enum {string}
+             */
+            code: "no_period" | "few_periods" | "slow_sampling" | "gaps" | "peak_beyond" | "peak_reached" | "peak_unknown" | "speed_beyond_rated" | "rated_speed_unknown" | "rated_torque_unknown" | "time_constant_unknown" | "overload_unknown" | "overload_exceeded" | "ambient_needs_rise";
             /**
              * Unit
              * @default
@@ -14467,9 +14467,9 @@ export type WatchUpdate = components['schemas']['WatchUpdate'];
 export type WatchValues = components['schemas']['WatchValues'];
 export type Where = components['schemas']['Where'];
 export type WriteResult = components['schemas']['WriteResult'];
-export type BackendToolsCycleResultFinding = components['schemas']['backend__tools__cycle__result__Finding'];
-export type BackendToolsFrictionResultFinding = components['schemas']['backend__tools__friction__result__Finding'];
-export type BackendToolsLoadSideResultFinding = components['schemas']['backend__tools__load_side__result__Finding'];
+export type BackendToolsMechanicsFrictionResultFinding = components['schemas']['backend__tools__mechanics__friction__result__Finding'];
+export type BackendToolsMechanicsLoadSideResultFinding = components['schemas']['backend__tools__mechanics__load_side__result__Finding'];
+export type BackendToolsWatchingCycleResultFinding = components['schemas']['backend__tools__watching__cycle__result__Finding'];
 export type $defs = Record<string, never>;
 export interface operations {
     accounts: {
