@@ -1179,6 +1179,11 @@ class reported_speed:
     """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
     CLEARLY = 0.77
     """[ratio] Origin: identify.CLEARLY."""
+    # COHERENT, FEW: Lines whose ratio of speed to position is compared, and how many at least.
+    COHERENT = 0.9
+    """[ratio] Origin: identify.COHERENT."""
+    FEW = 12
+    """[count] Origin: identify.FEW."""
 
 
 class sampled_model:

@@ -167,9 +167,7 @@ class Problem:
                 found.append(gradient / value)
             return found
 
-        values = [
-            np.log(value / view.g) for view, (value, _) in zip(self.views, seen, strict=True)
-        ]
+        values = [np.log(value / view.g) for view, (value, _) in zip(self.views, seen, strict=True)]
         return values, gradients
 
     def further(self, x: FloatArray, view: View, sampler: Sampler) -> ComplexArray | None:

@@ -1,7 +1,8 @@
 """Levenberg-Marquardt with bounds and a robust loss, for problems with few parameters.
 
-Value and slopes come from one call, the slopes only where they are needed, and steps from the normal equations: with some hundred
-residuals and a dozen parameters that is several times faster than a general solver.
+Value and slopes come from one call, the slopes only of steps that are accepted, and steps from the
+normal equations: with some hundred residuals and a dozen parameters that is several times faster
+than a general solver.
 Sources: Marquardt, J. SIAM 11 (1963) 431; Triggs et al., "Bundle adjustment: a modern
 synthesis" (2000), section 4.3 (robust costs by reweighting).
 """
@@ -40,8 +41,8 @@ def minimise(
     """Minimise the cost near ``start`` within ``low`` and ``high``.
 
     ``evaluate`` returns residuals [n] and a function for their slopes [n, m]; residuals much beyond
-    ``scale`` count linearly. It ends when the cost falls by less than its tolerance (relative), when steps
-    become small, or after ``steps`` evaluations.
+    ``scale`` count linearly. It ends when the cost falls by less than its tolerance (relative),
+    when steps become small, or after ``steps`` evaluations.
     """
     x = np.clip(start, low, high)
     r, slopes_of = evaluate(x)
