@@ -61,12 +61,14 @@ async def gain_steps(
     *,
     facts: AxisFacts,
     surely_db: float = 0.0,
+    begun_raw: int | None = None,
 ) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
 
     Up to ``surely_db`` every loop that the axis may have is stable: fewer steps lead there.
     ``present`` is the same step at the unchanged gain. A step of which too many samples were lost
-    shows nothing: no gain is raised further then.
+    shows nothing: no gain is raised further then. Where ``present`` left the axis at its end,
+    ``begun_raw`` is the position where it began; the axis returns there.
 
     A slow loop takes longer to return than to step. Steps therefore lead away and back in turn,
     each compared with one of the same direction at the unchanged gain.
@@ -77,16 +79,35 @@ async def gain_steps(
     drive = axis.drive
     key = gain_tool.spec_of(drive).speed
     if key is None or not received(present, settings):
+        if begun_raw is not None:
+            await go_back(axis, session, begun_raw, settings.envelope, facts)
         return GainSteps(0.0, None, ())
     parameter = drive.parameter(key)
     now = await drive.raw(key)
     value = si_value(parameter, float(parameter.to_value(now)))
-    home, envelope = await axis.position_raw(), settings.envelope
+    silent, envelope = Progress(lambda: None), settings.envelope
+    home = await axis.position_raw() if begun_raw is None else begun_raw
     directions = {False: settings, True: replace(settings, size=-settings.size)}
     unchanged = {False: present}
-    away = moved = False
+    away = moved = begun_raw is not None
     done: list[GainStep] = []
     levels = levels_to(wanted_db, surely_db)
+
+    async def back_unchanged() -> bool:
+        """Step back at the unchanged gain, to where steps begin; False where too much was lost."""
+        unchanged[True] = await step_response(axis, session, directions[True], silent, keep, True)
+        if not received(unchanged[True], settings):
+            return False
+        if await _elsewhere(axis, home, settings):
+            await go_back(axis, session, home, envelope, facts)
+        return True
+
+    if away:
+        if len(levels) == 1:
+            await go_back(axis, session, home, envelope, facts)
+        elif not await back_unchanged():
+            levels = []
+        away = False
     for db in levels:
         raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
         held = si_value(parameter, float(parameter.to_value(raw)))
@@ -96,7 +117,7 @@ async def gain_steps(
         if done and real_db < done[-1].gain_db + 0.1:
             break
         progress(len(done) / len(levels), text("autotune.db-more-gain", real_db=real_db))
-        back, silent = away, Progress(lambda: None)
+        back = away
         async with temporary(axis, {key: raw}):
             try:
                 step = await step_response(axis, session, directions[back], silent, keep, True)
@@ -113,13 +134,10 @@ async def gain_steps(
         if not done[-1].stable or len(done) == len(levels):
             break
         if True not in unchanged:
-            unchanged[True] = await step_response(
-                axis, session, directions[True], silent, keep, True
-            )
             away = False
-            if not received(unchanged[True], settings):
+            if not await back_unchanged():
                 break
-        if not away and await _elsewhere(axis, home, settings):
+        elif not away and await _elsewhere(axis, home, settings):
             await go_back(axis, session, home, envelope, facts)
     if moved:
         await go_back(axis, session, home, envelope, facts)

@@ -152,3 +152,32 @@ async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch)
     returned.clear()
     await raising.gain_steps(axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING)
     assert [number for number, _gain in returned] == [2, 4, 5]
+    # Begun where the step before ended: back first, for comparison, and no way home in between.
+    ways[-1], place = -0.4, 0.4
+    stepped.clear()
+    returned.clear()
+    found = await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert found.shown_db == pytest.approx(10.0, abs=0.1)
+    assert stepped[0] == (-1, 1.0)
+    assert [sign for sign, _gain in stepped] == [-1, 1, -1, 1, -1]
+    assert all(gain > 1.0 for _sign, gain in stepped[1:])
+    assert [number for number, _gain in returned] == [5]
+    # One raise is compared with the step that there is: no step back.
+    place = 0.4
+    stepped.clear()
+    returned.clear()
+    await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.0), 2.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert [sign for sign, _gain in stepped] == [1]
+    assert [number for number, _gain in returned] == [0, 1]
+    # Too much was lost: nothing is raised, and the axis returns all the same.
+    place = 0.4
+    stepped.clear()
+    returned.clear()
+    found = await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.12), 10.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert (found.steps, stepped, place) == ((), [], 0.0)
