@@ -155,7 +155,7 @@ def _best(
     """The chain with the best criterion, or free modes where they are much better."""
     views, period_s = chain.views, chain.period_s
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
-    if found.error > 0.05:
+    if found.error > max(threshold.LATE, threshold.ABOVE_NOISE * found.noise):
         # There may be a delay that no path shows.
         late = np.arange(0.25 * period_s, longest_delay_s + 1e-9, 0.25 * period_s) / period_s
         tried = [_grown(chain, _rigid_start(views[0], float(d)), 1) for d in late]
