@@ -157,7 +157,8 @@ def _best(
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
     if found.error > max(threshold.LATE, threshold.ABOVE_NOISE * found.noise):
         # There may be a delay that no path shows.
-        late = np.arange(0.25 * period_s, longest_delay_s + 1e-9, 0.25 * period_s) / period_s
+        step_s = (0.5 if to_whole_cycles else 0.25) * period_s
+        late = np.arange(step_s, longest_delay_s + 1e-9, step_s) / period_s
         tried = [_grown(chain, _rigid_start(views[0], float(d)), 1) for d in late]
         start = min([found, *tried], key=lambda t: t.score)
         if start is not found and to_whole_cycles and round(float(start.x[2])):
