@@ -40,7 +40,7 @@ from backend.tools.autotune.verdict import (
     verdicts_of,
     worst_of_paths,
 )
-from backend.tools.inertia.probe import holding_torque
+from backend.tools.inertia.probe import standing
 from backend.tools.measuring.recording import quiet
 from backend.tools.moves.go_back import go_back
 from backend.tools.step import evaluate as step_evaluation
@@ -48,6 +48,7 @@ from backend.tools.step.run import step_response
 from backend.tools.sweep import evaluation as sweep_evaluation
 from backend.tools.sweep import run as sweep_tool
 from backend.tools.thresholds import autotune_verify as threshold
+from drivers.errors import NotAllowed
 from drivers.texts.message import Text, joined, prose, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
@@ -55,6 +56,15 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 MOST_PAIRS = threshold.MOST_PAIRS
 LOOKS = threshold.LOOKS
 HUM_PERCENT = threshold.HUM_PERCENT
+
+
+class Hums(NotAllowed):
+    """The torque of the standing axis oscillates by far: no response need be measured for that."""
+
+    @property
+    def rms_percent(self) -> float:
+        """RMS of the torque, in % of rated torque."""
+        return float(str(self.text.params["rms_percent"]))
 
 
 @dataclass(frozen=True)
@@ -125,11 +135,14 @@ async def verify(
     where the first pair shows too little, or another bandwidth than predicted.
 
     Raises:
+        Hums: the torque oscillates at standstill by far: nothing else was measured.
         NotAllowed: the axis does not hold standstill, or the envelope or a fault ended it.
     """
-    standing, measuring, stepping = reported
-    standing(0.0, prose(""))
-    await holding_torque(axis, session, check.facts)
+    waiting, measuring, stepping = reported
+    waiting(0.0, prose(""))
+    ripple = (await standing(axis, session, check.facts)).ripple_percent
+    if ripple > threshold.SURELY_HUMS * HUM_PERCENT:
+        raise Hums("autotune.hums", rms_percent=ripple)
     if check.home_raw is not None:
         await quiet(axis)
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
