@@ -81,6 +81,7 @@ async def first_kept(
             tried.append(of_candidate(candidate, error.text))
             continue
         earlier = {key: await axis.drive.raw(key) for key in raw}
+        share: float | None
         # On the restore list: if this server is killed now, the next one undoes the unverified
         # values.
         with axis.drive.pending_restores.temporary(earlier):
