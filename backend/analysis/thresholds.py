@@ -655,6 +655,12 @@ class model_fit:
     """[criterion] Origin: d9add0c8 with benchmarks/tune_accuracy."""
     EXPLAINED = 0.003
     """[ratio] Origin: d9add0c8 with benchmarks/tune_accuracy."""
+    # LATE, ABOVE_NOISE: A delay is searched for where the misfit is larger than this, and than this
+    # multiple of the deviation of the lines: noise is no delay.
+    LATE = 0.05
+    """[ratio] Origin: 53a42117."""
+    ABOVE_NOISE = 1.5
+    """[ratio] Origin: identify.TRUSTED_ERROR, whose comparison with the noise it is."""
     FREED = 0.1
     """[ratio] Below this misfit mechanics are there, and delays and filter are free. Origin:
     2f3875f1 with benchmarks/analysis_comparison."""
@@ -1179,6 +1185,11 @@ class reported_speed:
     """[ratio] Origin: docs/tuning-accuracy.md, campaign of 27 November 2026."""
     CLEARLY = 0.77
     """[ratio] Origin: identify.CLEARLY."""
+    # COHERENT, FEW: Lines whose ratio of speed to position is compared, and how many at least.
+    COHERENT = 0.9
+    """[ratio] Origin: identify.COHERENT."""
+    FEW = 12
+    """[count] Origin: identify.FEW."""
 
 
 class sampled_model:

@@ -304,6 +304,10 @@ class autotune_verify:
     """[ratio] Origin: 5caa8367."""
     DOUBTED = 0.08
     """[ratio] Origin: 5caa8367."""
+    SURELY_HUMS = 2.0
+    """[ratio] A dozen readings at standstill with so many times the torque of a hum are one: by
+    chance they are 1.5 times theirs in one of a hundred. Origin: chi-square of ten degrees of
+    freedom."""
     HUM_PERCENT = 4.0
     """[%] Torque of a standing axis, root mean square in % of rated torque, that is a hum. Origin:
     33aa8ae7."""

@@ -78,26 +78,47 @@ class Worst:
 
 def worst_of(loops: ComplexArray) -> Worst:
     """Return the worst margins of open loops [shifts, lines] on their dense grid."""
-    size = loops.real**2 + loops.imag**2
-    over = size > 1.0
-    row, line = np.nonzero(over[:, 1:] != over[:, :-1])
-    phase_margin = 90.0
-    if row.size:
-        ends = np.concatenate([loops[row, line], loops[row, line + 1]])
-        phase_margin = float(np.degrees(np.min(np.abs(np.angle(-ends)))))
-    # Crossings of the negative real axis: the magnitude there is interpolated.
-    real, imag = loops.real, loops.imag
-    flips = (imag[:, 1:] > 0) != (imag[:, :-1] > 0)
-    row, line = np.nonzero(flips & (real[:, 1:] < 0) & (real[:, :-1] < 0))
-    gain_margin = 60.0
-    if row.size:
-        low, high = imag[row, line], imag[row, line + 1]
-        share = low / (low - high)
-        level = -(real[row, line] * (1.0 - share) + real[row, line + 1] * share)
-        inside = level[level < 1.0]
-        if inside.size:
-            gain_margin = min(60.0, float(-20.0 * np.log10(np.max(inside))))
+    gain_margin, phase_margin = _gain_margin_db(loops), _phase_margin_deg(loops)
     return Worst(gain_margin, phase_margin, sensitivity_peak(loops), bool(np.all(stable(loops))))
+
+
+def keeps(loops: ComplexArray, goals: Goals) -> bool:
+    """Whether the worst margins of open loops [shifts, lines] meet the goals, as `Worst.meets`.
+
+    What fails most often is evaluated first.
+    """
+    return (
+        sensitivity_peak(loops) <= goals.ms
+        and bool(np.all(stable(loops)))
+        and _phase_margin_deg(loops) >= goals.phase_margin_deg
+        and _gain_margin_db(loops) >= goals.gain_margin_db
+    )
+
+
+def _phase_margin_deg(loops: ComplexArray) -> float:
+    """The smallest distance of a 0 dB crossing from -180 degrees; 90 without any."""
+    over = loops.real**2 + loops.imag**2 > 1.0
+    row, line = np.nonzero(over[:, 1:] != over[:, :-1])
+    if not row.size:
+        return 90.0
+    ends = np.concatenate([loops[row, line], loops[row, line + 1]])
+    return float(np.degrees(np.min(np.abs(np.angle(-ends)))))
+
+
+def _gain_margin_db(loops: ComplexArray) -> float:
+    """The smallest gain margin, 60 dB at most; magnitudes at -180 degrees are interpolated."""
+    real, imag = loops.real, loops.imag
+    above = imag > 0
+    row, line = np.nonzero((above[:, 1:] != above[:, :-1]) & (real[:, 1:] < 0) & (real[:, :-1] < 0))
+    if not row.size:
+        return 60.0
+    low, high = imag[row, line], imag[row, line + 1]
+    share = low / (low - high)
+    level = -(real[row, line] * (1.0 - share) + real[row, line + 1] * share)
+    inside = level[level < 1.0]
+    if not inside.size:
+        return 60.0
+    return min(60.0, float(-20.0 * np.log10(np.max(inside))))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ import numpy as np
 from backend.analysis.loop.loop_goals import (
     Goals,
     Worst,
-    sensitivity_peak,
+    keeps,
     stable_with_less_gain,
     worst_of,
 )
@@ -120,18 +120,26 @@ class LoopSearch:
         assert fixed is not None
         return worst_of(self.loops_at(fixed, bandwidth_hz))
 
+    def _peaks_on_some(self, fixed: ComplexArray, bandwidth_hz: FloatArray) -> FloatArray:
+        """Ms on some of the lines, for each bandwidth [n].
+
+        A shape that fails on some of the lines need not be evaluated on all of them.
+        """
+        by_gain = fixed[:: threshold.SOME] * (TURN * self.inertia_kgm2)
+        by_integral = by_gain * (TURN / INTEGRAL_RATIO / self._s[:: threshold.SOME])
+        b = bandwidth_hz[:, None]
+        loops = self._some * (b * (by_gain + b * by_integral))[:, None, :]
+        distance = np.min((1.0 + loops.real) ** 2 + loops.imag**2, axis=(1, 2))
+        return np.asarray(1.0 / np.sqrt(distance))
+
     def _keeps(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
-        # A shape that fails on some of the lines need not be evaluated on all of them.
-        corner = TURN * bandwidth_hz / INTEGRAL_RATIO
-        pi = TURN * bandwidth_hz * self.inertia_kgm2 * (1.0 + corner / self._s[:: threshold.SOME])
-        if sensitivity_peak(self._some * (fixed[:: threshold.SOME] * pi)) > goals.ms:
+        if self._peaks_on_some(fixed, np.array([bandwidth_hz]))[0] > goals.ms:
             return False
-        loops = self.loops_at(fixed, bandwidth_hz)
-        return sensitivity_peak(loops) <= goals.ms and worst_of(loops).meets(goals)
+        return keeps(self.loops_at(fixed, bandwidth_hz), goals)
 
     def _safe(self, fixed: ComplexArray, bandwidth_hz: float, goals: Goals) -> bool:
-        kept = self._keeps(fixed, bandwidth_hz, goals)
-        return kept and stable_with_less_gain(self.loops_at(fixed, bandwidth_hz))
+        loops = self.loops_at(fixed, bandwidth_hz)
+        return keeps(loops, goals) and stable_with_less_gain(loops)
 
     def highest(self, shape: Shape, goals: Goals, above_hz: float = 0.0) -> float:
         """Return the highest bandwidth that meets the goals; 0 if it is not above ``above_hz``."""
@@ -142,10 +150,9 @@ class LoopSearch:
         # Search from the top: above a gain at which a resonance fails, a higher one may meet the
         # goals.
         count = 2 + int(np.log(self._highest / lowest) / np.log(threshold.COARSE))
-        levels = np.geomspace(lowest, self._highest, count)
-        good = next(
-            (i for i in range(count - 1, -1, -1) if self._safe(fixed, levels[i], goals)), -1
-        )
+        levels = np.exp(np.linspace(np.log(lowest), np.log(self._highest), count))
+        possible = np.flatnonzero(self._peaks_on_some(fixed, levels) <= goals.ms)
+        good = next((i for i in possible[::-1] if self._safe(fixed, levels[i], goals)), -1)
         if good < 0:
             return 0.0
         low, high = float(levels[good]), float(levels[min(good + 1, count - 1)])

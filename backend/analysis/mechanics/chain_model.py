@@ -9,6 +9,8 @@ speed filter's corner (these belong to the path), and per load log J, log k and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from backend.analysis.mechanics.mechanical_model import (
@@ -30,36 +32,42 @@ def loads_of(x: FloatArray) -> FloatArray:
 
 def chain_response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return the response from torque to velocity [...] and its slopes [n parameters, ...] (zero
-    for the path).
+) -> tuple[ComplexArray, Callable[[], ComplexArray]]:
+    """Return the response from torque to velocity [...], and a function for its slopes
+    [n parameters, ...] (zero for the path), which are often not needed.
 
     Calculated from the far end towards the motor by impedances: an inertia is sJ, a coupling k/s +
     d in series with everything behind it.
     """
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
+    per_s = 1.0 / s
     loads = loads_of(x)
     behind = np.zeros_like(s)
-    parts: list[tuple[ComplexArray, ComplexArray, ComplexArray]] = []
+    parts: list[tuple[ComplexArray, ComplexArray]] = []
     for inertia, stiffness, damping in loads[::-1]:
-        coupling = stiffness / s + damping
-        hanging = s * inertia + behind
-        total = coupling + hanging
-        parts.append((coupling / total, hanging / total, s * inertia))
-        behind = coupling * hanging / total
+        coupling = stiffness * per_s + damping
+        inertial = s * inertia
+        hanging = inertial + behind
+        through = coupling / (coupling + hanging)
+        parts.append((through, inertial))
+        behind = through * hanging
     motor, viscous = np.exp(x[0]), np.exp(x[1])
     response = 1.0 / (s * motor + viscous + behind)
-    slopes = np.zeros((x.size, *s.shape), dtype=np.complex128)
-    outwards = -(response**2)
-    slopes[0] = outwards * s * motor
-    slopes[1] = outwards * viscous
-    for i, (through, into, inertial) in enumerate(reversed(parts)):
-        place = RIGID_PARAMETERS + LOAD_PARAMETERS * i
-        by_coupling = outwards * into**2
-        outwards = outwards * through**2
-        slopes[place] = outwards * inertial
-        slopes[place + 1] = by_coupling * loads[i, 1] / s
-        slopes[place + 2] = by_coupling * loads[i, 2]
+
+    def slopes() -> ComplexArray:
+        out = np.zeros((x.size, *s.shape), dtype=np.complex128)
+        outwards = -(response**2)
+        out[0] = outwards * s * motor
+        out[1] = outwards * viscous
+        for i, (through, inertial) in enumerate(reversed(parts)):
+            place = RIGID_PARAMETERS + LOAD_PARAMETERS * i
+            by_coupling = outwards * (1.0 - through) ** 2
+            outwards = outwards * through**2
+            out[place] = outwards * inertial
+            out[place + 1] = by_coupling * loads[i, 1] * per_s
+            out[place + 2] = by_coupling * loads[i, 2]
+        return out
+
     return np.asarray(response), slopes
 
 

@@ -6,6 +6,7 @@ A rigid part and modes with positive residues, G(s) = g/(s + p) + Σ α_i·(s + 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,23 +127,35 @@ def model_of(x: FloatArray) -> MechanicalModel:
 
 def response_and_slopes(
     x: FloatArray, frequency_hz: FloatArray
-) -> tuple[ComplexArray, ComplexArray]:
-    """Return the response [...] of `model_of` (x), and its slopes [n, ...], 0 for the path."""
+) -> tuple[ComplexArray, Callable[[], ComplexArray]]:
+    """Return the response [...] of `model_of` (x), and a function for its slopes [n, ...], 0 for
+    the path.
+    """
     s = 1j * TURN * np.asarray(frequency_hz, dtype=np.float64)
     gain, pole = np.exp(x[0]), np.exp(x[1])
     rigid = gain / (s + pole)
-    slopes = np.zeros((x.size, *s.shape), dtype=np.complex128)
-    slopes[0] = rigid
-    slopes[1] = -rigid * pole / (s + pole)
     total = rigid.copy()
+    modes: list[tuple[ComplexArray, ComplexArray]] = []
     for i in range(RIGID_PARAMETERS, x.size, MODE_PARAMETERS):
         w, zeta, residue, part = TURN * np.exp(x[i]), np.exp(x[i + 1]), np.exp(x[i + 2]), x[i + 3]
         below = s * s + 2 * zeta * w * s + w * w
-        above = s + part * w
-        mode = residue * above / below
+        mode = residue * (s + part * w) / below
         total += mode
-        slopes[i] = residue * part * w / below - mode * (2 * zeta * w * s + 2 * w * w) / below
-        slopes[i + 1] = -mode * 2 * zeta * w * s / below
-        slopes[i + 2] = mode
-        slopes[i + 3] = residue * w / below
+        modes.append((mode, below))
+
+    def slopes() -> ComplexArray:
+        out = np.zeros((x.size, *s.shape), dtype=np.complex128)
+        out[0] = rigid
+        out[1] = -rigid * pole / (s + pole)
+        for i, (mode, below) in zip(
+            range(RIGID_PARAMETERS, x.size, MODE_PARAMETERS), modes, strict=True
+        ):
+            w, zeta = TURN * np.exp(x[i]), np.exp(x[i + 1])
+            residue, part = np.exp(x[i + 2]), x[i + 3]
+            out[i] = residue * part * w / below - mode * (2 * zeta * w * s + 2 * w * w) / below
+            out[i + 1] = -mode * 2 * zeta * w * s / below
+            out[i + 2] = mode
+            out[i + 3] = residue * w / below
+        return out
+
     return total, slopes

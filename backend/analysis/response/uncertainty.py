@@ -112,8 +112,9 @@ def _parts(view: View, values: ComplexArray) -> tuple[FloatArray, FloatArray]:
 def _plant_slopes(problem: Problem, x: FloatArray) -> ComplexArray:
     """Slopes of the logarithm of the mechanics alone [parameters, lines]."""
     plant, slopes = problem.form.response(x, problem.views[0].f)
-    slopes[_DELAY:RIGID_PARAMETERS] = 0.0
-    return np.asarray(slopes / plant)
+    by_parameter = slopes()
+    by_parameter[_DELAY:RIGID_PARAMETERS] = 0.0
+    return np.asarray(by_parameter / plant)
 
 
 def _late_slopes(problem: Problem, view: View, x: FloatArray) -> ComplexArray:

@@ -6,12 +6,20 @@ import numpy as np
 import pytest
 
 from backend.analysis.loop.measured_plant import measured_plant
-from backend.analysis.mechanics.identification.fit_problem import CHAIN, MODAL, KnownInertia
+from backend.analysis.mechanics.identification import model_fit
+from backend.analysis.mechanics.identification.fit_problem import (
+    CHAIN,
+    MODAL,
+    Found,
+    KnownInertia,
+    Problem,
+)
 from backend.analysis.mechanics.identification.model_fit import fit_sampled_model
 from backend.analysis.mechanics.mechanical_model import MechanicalModel
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.signal_path.sampled_model import LoopModel, seen_response
 from backend.analysis.response.signal_path.sampling import SignalPath
+from backend.analysis.signals.arrays import FloatArray
 
 MOTOR, LOAD = 7e-5, 1.27e-4
 #: Antiresonance at 9.3 Hz, resonance at 15.6 Hz.
@@ -24,10 +32,10 @@ LINES = np.arange(6.15, 600.0, 1.54)
 HIDDEN = LINES < 22.0
 
 
-def measured(seed: int) -> Frf:
-    """Lines known to 2 %, those below 22 Hz to half of themselves."""
+def measured(seed: int, clear: float = 0.02) -> Frf:
+    """Lines known to ``clear`` of themselves, those below 22 Hz to half."""
     rng = np.random.default_rng(seed)
-    relative = np.where(HIDDEN, 0.5, 0.02)
+    relative = np.where(HIDDEN, 0.5, clear)
     noise = relative * (rng.standard_normal(LINES.size) + 1j * rng.standard_normal(LINES.size))
     seen = seen_response(LINES, CHAIN.model(CHAIN_X), 0.0, PATH, LoopModel())
     none = np.zeros(LINES.size)
@@ -104,3 +112,22 @@ def test_a_line_counts_beside_the_model_as_exactly_as_it_is_known(
 
 def test_a_model_that_is_not_fitted_to_the_lines_takes_nothing_from_them() -> None:
     assert np.mean(plant_beside(40.0, fitted=False)) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_noise_is_not_searched_for_a_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A misfit of 8 % is the noise of lines known to 8 %; of lines known to 2 % it may be one."""
+    begun: list[float] = []
+    grown = model_fit._grown
+
+    def counted(problem: Problem, start: FloatArray, max_modes: int) -> Found:
+        begun.append(float(start[2]))
+        return grown(problem, start, max_modes)
+
+    monkeypatch.setattr(model_fit, "_grown", counted)
+    noisy = measured(0, clear=0.08)
+    found = fit_sampled_model(noisy, PATH, max_modes=1).fit
+    assert found.error > 0.05
+    assert begun == [0.0]
+    late = replace(noisy, std_db=noisy.std_db / 4.0, std_deg=noisy.std_deg / 4.0)
+    fit_sampled_model(late, PATH, max_modes=1)
+    assert max(begun) == 3.0

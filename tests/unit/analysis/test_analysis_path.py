@@ -9,7 +9,7 @@ from random_axes import RATED_NM, Case, errors, played, result_of
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from backend.analysis.mechanics.identification import identification_trials
+from backend.analysis.mechanics.identification import identification_trials, model_fit
 from backend.analysis.mechanics.identification.identification_trials import Task
 from backend.analysis.mechanics.identification.identify import (
     Identification,
@@ -181,7 +181,7 @@ def test_minimum_is_that_of_a_general_solver():
     def both(x):
         e = np.exp(-x[1] * t)
         slopes = np.column_stack([e, -x[0] * t * e, np.ones(t.size)])
-        return x[0] * e + x[2] - y, slopes
+        return x[0] * e + x[2] - y, lambda: slopes
 
     low, high = np.array([0.0, 0.1, -1.0]), np.array([5.0, 1.2, 1.0])
     for top in (3.0, 1.2):  # free, and held by a bound
@@ -189,7 +189,7 @@ def test_minimum_is_that_of_a_general_solver():
         own = minimise(both, np.array([1.0, 0.5, 0.0]), low, high, scale=0.1, steps=100,
                        cost_tolerance=1e-10, step_tolerance=1e-9)  # fmt: skip
         other = least_squares(
-            lambda x: both(x)[0], [1.0, 0.5, 0.0], lambda x: both(x)[1], bounds=(low, high),
+            lambda x: both(x)[0], [1.0, 0.5, 0.0], lambda x: both(x)[1](), bounds=(low, high),
             loss="soft_l1", f_scale=0.1, xtol=1e-12, ftol=1e-12,
         )  # fmt: skip
         assert own.cost == pytest.approx(other.cost, rel=1e-4)
@@ -262,3 +262,26 @@ def test_a_filtered_torque_costs_no_search_with_its_own_path(monkeypatch):
     e = errors(found.direct, ONE, 5.0, 250.0)
     assert e.magnitude_db < 0.1
     assert e.phase_deg < 0.5
+
+
+@pytest.mark.parametrize("late_steps", [0, 40])
+def test_both_holds_at_their_cycles_by_one_search_for_the_delay(monkeypatch, late_steps):
+    """Without a torque that shows them: the delay of one hold was searched for again with both."""
+    case = case_of(1000.0, late_steps=late_steps, current_hz=1000.0)
+    records = tuple(replace(r, torque=None) for r in records_of(case))
+    begun = []
+    grown = model_fit._grown
+
+    def counted(problem, start, max_modes):
+        begun.append(float(start[2]))
+        return grown(problem, start, max_modes)
+
+    monkeypatch.setattr(model_fit, "_grown", counted)
+    path = SignalPath(1000.0, current_bandwidth_hz=1000.0)
+    found = Task(records, "torque_mode").of_both_holds(path)
+    assert [trial.path.hold for trial in found] == ["zero", "linear"]
+    assert found[0].path.command_delay_s == pytest.approx(late_steps * 50e-6)
+    assert abs(found[0].fit.delay_s) < 10e-6
+    # Delays of half a cycle to three, once; and the mechanics at each path once.
+    assert sum(late > 0.0 for late in begun) == (6 if late_steps else 0)
+    assert begun.count(0.0) <= 4

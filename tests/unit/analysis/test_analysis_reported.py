@@ -10,13 +10,15 @@ from measured_axes import ONE, tuned_drive
 from random_axes import errors
 from scipy.signal import butter, lfilter
 
+from backend.analysis.mechanics.identification import identification_trials
+from backend.analysis.mechanics.identification.identification_trials import Task
 from backend.analysis.mechanics.identification.identify import identify_with_path
 from backend.analysis.response.reported_signals.reported import (
     commanded,
     current_uncertainty,
     mean_cycles,
 )
-from backend.analysis.response.reported_signals.reported_speed import derivative
+from backend.analysis.response.reported_signals.reported_speed import derivative, signals_differ
 from backend.analysis.response.signal_path.sampling import SignalPath, lag_response
 from backend.analysis.signals.excitation import BaseMotion, choose_lines, multisine, scaled
 from backend.analysis.signals.line_spectra import Record
@@ -108,6 +110,11 @@ def _late_mean(speed):
     return lfilter(np.concatenate([np.zeros(8), np.full(25, 1 / 25)]), 1.0, speed)
 
 
+def _slow_mean(speed):
+    """A mean over 3 ms that is 1 ms old: nulls within the band."""
+    return lfilter(np.concatenate([np.zeros(20), np.full(60, 1 / 60)]), 1.0, speed)
+
+
 def _triangle(speed):
     """A mean of means over 1 ms each."""
     return lfilter(np.convolve(np.full(20, 1 / 20), np.full(20, 1 / 20)), 1.0, speed)
@@ -147,6 +154,41 @@ def test_a_speed_that_no_lag_explains_is_not_used(reported, filter_hz):
     assert e.covered > 0.9
     assert e.magnitude_db < 0.1
     assert e.phase_deg < 0.5
+
+
+def test_a_speed_that_no_lag_explains_costs_no_search_with_it(monkeypatch):
+    """Mechanics that explain both were searched for first, with twelve delays: 11 of 13 s."""
+    records = tuple(replace(r, response=_slow_mean(fine)[::FINER]) for r, fine in recorded_finely())
+    path = SignalPath(RATE, current_bandwidth_hz=1000.0)
+    searched = []
+    fit = identification_trials.fit_sampled_model
+
+    def fitted(velocity, path, **given):
+        if given.get("start") is None:
+            searched.append(float(np.min(velocity.std_db)))
+        return fit(velocity, path, **given)
+
+    monkeypatch.setattr(identification_trials, "fit_sampled_model", fitted)
+    found = identify_with_path(records, path, "torque_mode", hold_known=False)
+    assert found.speed_dropped
+    # The position alone: the speed's lines have no weight.
+    assert min(searched) >= 1e3
+
+
+@pytest.mark.parametrize("corner_hz", [None, 150.0, 2000.0])
+def test_a_speed_behind_a_lag_and_a_delay_does_not_differ_from_the_position(corner_hz):
+    finely = recorded_finely()
+    path = SignalPath(RATE, current_bandwidth_hz=1000.0)
+    a = 0.0 if corner_hz is None else float(np.exp(-TURN * corner_hz / (FINER * RATE)))
+    late = np.concatenate([np.zeros(8), [1.0]])
+
+    def differs(shown):
+        records = tuple(replace(r, response=shown(fine)[::FINER]) for r, fine in finely)
+        views = Task(records, "torque_mode").views(path, None)
+        return signals_differ(views.velocity, views.position, path)
+
+    assert not differs(lambda fine: lfilter(late * (1.0 - a), [1.0, -a], fine))
+    assert differs(_slow_mean)
 
 
 @pytest.mark.long

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from backend.analysis.loop.loop_goals import Goals, each_of, worst_of
+from backend.analysis.loop.loop_goals import Goals, each_of, keeps, worst_of
 from backend.analysis.loop.loop_verdict import Lines, LoopVerdict, excluding_db, judge
 from backend.analysis.response.signal_path.reference_path import reference_paths
 from backend.analysis.response.signal_path.sampling import hold_response
@@ -366,6 +366,9 @@ def test_margins_of_each_loop_are_those_of_it_alone() -> None:
         assert each.phase_margin_deg[number] == pytest.approx(alone.phase_margin_deg)
         assert each.ms[number] == pytest.approx(alone.ms)
         assert each.stable[number] == alone.stable
+        for goals in (GUARANTEED, Goals(6.0, 20.0, 2.5), Goals(3.0, 50.0, 9.0)):
+            assert keeps(loop[None, :], goals) is alone.meets(goals)
+            assert keeps(loops[: number + 1], goals) is worst_of(loops[: number + 1]).meets(goals)
     assert 10 < np.count_nonzero(each.stable) < 60
 
 

@@ -30,7 +30,7 @@ from backend.analysis.mechanics.mechanical_model import (
 )
 from backend.analysis.response.frf import Frf
 from backend.analysis.response.signal_path.sampled_model import LoopModel, Sampler
-from backend.analysis.response.signal_path.sampling import SignalPath, delay_response, lag_response
+from backend.analysis.response.signal_path.sampling import SignalPath, lag_response
 from backend.analysis.signals.arrays import BoolArray, ComplexArray, FloatArray
 from backend.analysis.thresholds import fit_problem as threshold
 
@@ -91,7 +91,7 @@ class KnownInertia:
 class Form:
     """A parametrisation of the mechanics: response, model, bounds and prior."""
 
-    response: Callable[[FloatArray, FloatArray], tuple[ComplexArray, ComplexArray]]
+    response: Callable[[FloatArray, FloatArray], tuple[ComplexArray, Callable[[], ComplexArray]]]
     model: Callable[[FloatArray], MechanicalModel]
     bounds: Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
     prior: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -128,48 +128,67 @@ class Problem:
     """Inertia from moves; the only information on it where friction hides the low lines."""
 
     @cached_property
-    def _frequencies(self) -> FloatArray:
+    def _sampler(self) -> Sampler:
         # All views have the same lines, and so the same images.
-        return self.views[0].sampler.frequency_hz
+        return self.views[0].sampler
 
     def logs(self, x: FloatArray) -> tuple[list[ComplexArray], list[ComplexArray]]:
         """Return per view log(seen/measured) [lines] and its slopes [parameters, lines]."""
-        f = self._frequencies
-        plant, slopes = self.form.response(x, f)
-        late = delay_response(f, float(x[2]) * self.period_s)
-        plant = plant * late
-        slopes = slopes * late
-        turn = -2j * np.pi * f * self.period_s
-        slopes[2] = turn * plant
-        values, gradients = [], []
-        for view in self.views:
-            corner = np.exp(x[4])
-            further = self.further(x, view, f)
-            seen, by_plant, by_further = view.sampler.seen(plant, further)
-            gradient = np.einsum("pil,il->pl", slopes, by_plant)
-            if further is not None and view.integrated:
-                by_delay = np.sum(turn * further * by_further, axis=0)
-                gradient[2] -= by_delay
-                gradient[3] += by_delay
-            elif further is not None:
-                by_corner = further * (1j * f / corner) / (1.0 + 1j * f / corner)
-                gradient[4] = np.sum(by_corner * by_further, axis=0)
-            values.append(np.log(seen / view.g))
-            gradients.append(gradient / seen)
+        values, gradients = self._logs(x)
+        return values, gradients()
+
+    def _logs(self, x: FloatArray) -> tuple[list[ComplexArray], Callable[[], list[ComplexArray]]]:
+        """`logs`, with a function for the slopes: a step that is rejected needs none."""
+        f = self._sampler.frequency_hz
+        alone, plant_slopes = self.form.response(x, f)
+        late = self._sampler.late(float(x[2]) * self.period_s)
+        plant = alone * late
+        furthers = [self.further(x, view, self._sampler) for view in self.views]
+        seen = [
+            view.sampler.seen(plant, further)
+            for view, further in zip(self.views, furthers, strict=True)
+        ]
+
+        def gradients() -> list[ComplexArray]:
+            slopes = plant_slopes()
+            turn = -2j * np.pi * f * self.period_s
+            found = []
+            for view, further, (value, by_both) in zip(self.views, furthers, seen, strict=True):
+                by_plant, by_further = by_both()
+                gradient = np.einsum("pil,il->pl", slopes, by_plant * late)
+                gradient[2] = np.einsum("il,il->l", turn * plant, by_plant)
+                if further is not None and view.integrated:
+                    by_delay = np.einsum("il,il->l", turn * further, by_further)
+                    gradient[2] -= by_delay
+                    gradient[3] += by_delay
+                elif further is not None:
+                    # The lag's slope by the logarithm of its corner is its own complement.
+                    gradient[4] = np.einsum("il,il->l", further * (1.0 - further), by_further)
+                found.append(gradient / value)
+            return found
+
+        values = [np.log(value / view.g) for view, (value, _) in zip(self.views, seen, strict=True)]
         return values, gradients
 
-    def further(self, x: FloatArray, view: View, f: FloatArray) -> ComplexArray | None:
+    def further(self, x: FloatArray, view: View, sampler: Sampler) -> ComplexArray | None:
         """Return the factor in the path of this view's signal alone, for the parameters."""
         if view.integrated:
-            return delay_response(f, float(x[3] - x[2]) * self.period_s)
-        return lag_response(f, float(np.exp(x[4]))) if self.free_filter else None
+            return sampler.late(float(x[3] - x[2]) * self.period_s)
+        if not self.free_filter:
+            return None
+        return lag_response(sampler.frequency_hz, float(np.exp(x[4])))
 
     def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the weighted logarithmic error, the same for peaks and valleys, and its slopes
         [n, parameters].
         """
-        values, gradients = self.logs(x)
-        return self._rows(x, values), self._slopes(x, gradients)
+        rows, slopes = self._misfit(x)
+        return rows, slopes()
+
+    def _misfit(self, x: FloatArray) -> tuple[FloatArray, Callable[[], FloatArray]]:
+        """`misfit`, with a function for the slopes."""
+        values, gradients = self._logs(x)
+        return self._rows(x, values), lambda: self._slopes(x, gradients())
 
     def _rows(self, x: FloatArray, values: list[ComplexArray]) -> FloatArray:
         rows = [v * view.weight for v, view in zip(values, self.views, strict=True)]
@@ -181,12 +200,19 @@ class Problem:
         return np.concatenate([p for e in rows for p in (e.real, e.imag)] + usual)
 
     def _slopes(self, x: FloatArray, gradients: list[ComplexArray]) -> FloatArray:
-        rows = [g * view.weight for g, view in zip(gradients, self.views, strict=True)]
         path = np.zeros((3, x.size))
         path[0, 2] = path[1, 3] = self.period_s / threshold.USUAL_DELAY_S
         path[2, 4] = 1.0 / threshold.CORNER_SPREAD
-        usual = [path, self.form.prior(x)[1], self._known(x)[1]]
-        return np.concatenate([p.T for e in rows for p in (e.real, e.imag)] + usual)
+        usual = np.concatenate([path, self.form.prior(x)[1], self._known(x)[1]])
+        lines = [view.f.size for view in self.views]
+        out = np.empty((2 * sum(lines) + len(usual), x.size))
+        place = 0
+        for gradient, view in zip(gradients, self.views, strict=True):
+            for part in (gradient.real, gradient.imag):
+                np.multiply(part.T, view.weight[:, None], out=out[place : place + view.f.size])
+                place += view.f.size
+        out[place:] = usual
+        return out
 
     def _known(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Deviation of the whole inertia from the known one [0 or 1 rows], and its slopes."""
@@ -219,7 +245,7 @@ class Problem:
             low[2:5] = np.maximum(low[2:5], self.anchor - _NEAR_ANCHOR)
             high[2:5] = np.minimum(high[2:5], self.anchor + _NEAR_ANCHOR)
         fit = minimise(
-            self.misfit,
+            self._misfit,
             np.clip(start, low + 1e-9, high - 1e-9),
             low,
             high,
@@ -230,7 +256,7 @@ class Problem:
         # Real data are not better than the floor of their weights, as synthetic data may be.
         misfit = max(2 * fit.cost, 1e-6 * points)
         score = points * np.log(misfit / points) + start.size * np.log(points)
-        values, _ = self.logs(fit.x)
+        values, _ = self._logs(fit.x)
         errors = [
             _median(np.abs(np.expm1(v)), w.weight) for v, w in zip(values, self.views, strict=True)
         ]

@@ -94,8 +94,14 @@ class Task:
         coulomb_nm: float | None = None,
         motion: SampledFit | None = None,
         start: Solution | None = None,
+        longest_delay_s: float | None = None,
+        *,
+        to_whole_cycles: bool = False,
     ) -> Trial:
-        """Return estimates and fit with one path; ``motion``: an earlier fit, to correct images."""
+        """Return estimates and fit with one path; ``motion``: an earlier fit, to correct images.
+
+        ``longest_delay_s`` and ``to_whole_cycles`` as in `fit_sampled_model`.
+        """
         if self.quantity == "closed_loop":
             raise ValueError("mechanics are identified from torque, not from a loop's reference")
         views = self.views(path, coulomb_nm)
@@ -105,6 +111,8 @@ class Task:
             from_position=views.position,
             loop=self._loop(path, motion),
             max_modes=self.max_modes,
+            longest_delay_s=longest_delay_s,
+            to_whole_cycles=to_whole_cycles,
             start=start,
             inertia=self.inertia,
         )
@@ -121,18 +129,38 @@ class Task:
             tried += [self.trial(p) for p in paths if p not in first]
         return sorted(tried, key=rank)
 
-    def at_cycles(self, path: SignalPath, hold: Hold) -> Trial:
-        """Return the fit with this hold and the whole cycles that leave the least delay."""
+    def of_both_holds(self, path: SignalPath) -> list[Trial]:
+        """Return the fits with this path's corner and each hold at its best cycles, best first.
+
+        What one hold leaves of the delay is where the search with the other one begins.
+        """
+        held = self.at_cycles(path, "zero")
+        rate = path.sample_rate_hz
+        # Half a cycle more passes until a line than until a step.
+        known_s = held.path.command_delay_s + held.fit.delay_s - 0.5 / rate
+        late_s = max(known_s, command_delay_s(0, "linear", rate))
+        line = self.at_cycles(replace(path, command_delay_s=late_s), "linear", 1.0 / rate)
+        return sorted([held, line], key=rank)
+
+    def at_cycles(
+        self, path: SignalPath, hold: Hold, longest_delay_s: float | None = None
+    ) -> Trial:
+        """Return the fit with this hold and the whole cycles that leave the least delay.
+
+        ``longest_delay_s`` is the longest delay searched for beyond the path's.
+        """
         rate = path.sample_rate_hz
         # A path that is too early shows as a remaining delay; one that is too late may not.
         cycles = max(math.floor(path.command_delay_s * rate - 0.25), 0)
         late_s = command_delay_s(cycles, hold, rate)
-        trial = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        begun = replace(path, hold=hold, command_delay_s=late_s)
+        trial = self.trial(begun, longest_delay_s=longest_delay_s, to_whole_cycles=True)
         more = round(trial.fit.delay_s * rate)
         if more == 0 or cycles + more < 0:
             return trial
         late_s = command_delay_s(cycles + more, hold, rate)
-        other = self.trial(replace(path, hold=hold, command_delay_s=late_s))
+        # The delay was searched for: what is left of it is a part of a cycle.
+        other = self.trial(replace(begun, command_delay_s=late_s), longest_delay_s=0.5 / rate)
         return min(trial, other, key=rank)
 
     def by_motion(self, trial: Trial) -> Trial:

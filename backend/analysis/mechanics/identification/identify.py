@@ -35,8 +35,10 @@ from backend.analysis.response.reported_signals.reported_demand import (
     with_acting_torque,
 )
 from backend.analysis.response.reported_signals.reported_speed import (
+    signals_differ,
     speed_contradicts,
     speed_suspect,
+    surely_contradicts,
 )
 from backend.analysis.response.signal_path.path_fit import (
     at_whole_cycles,
@@ -48,7 +50,6 @@ from backend.analysis.response.signal_path.sampled_model import SampledFit
 from backend.analysis.response.signal_path.sampling import (
     DIRECT_SHARE,
     USUAL_CURRENT_HZ,
-    Hold,
     SignalPath,
     delay_response,
     lag_response,
@@ -68,8 +69,6 @@ from backend.analysis.signals.line_spectra import Quantity, Record
 from backend.analysis.signals.transient_removal import settled
 from backend.analysis.thresholds import identify as threshold
 from backend.analysis.thresholds import model_fit
-
-_HOLDS: tuple[Hold, ...] = ("zero", "linear")
 
 
 @dataclass(frozen=True)
@@ -160,14 +159,16 @@ def identify_with_path(
     else:
         paths = (replace(loop.path, response_bandwidth_hz=path.response_bandwidth_hz),)
 
+    begun = task
+
     def with_loop(other: Task) -> list[Trial]:
-        if loop is not None:
+        if loop is not None or other is begun:
             return other.trials(paths)
         by_speed = find_paths(other.records, path, loop_closed=True, hold_known=hold_known)
         return other.trials(by_speed)
 
     if closed:
-        task, trials = _with_true_speed(task, task.trials(paths), with_loop)
+        task, trials = _with_true_speed(task, paths[0], with_loop)
         if demand is not None and trials[0].fit.loop.closed:
             fit = trials[0].fit
             records = tuple(with_acting_torque(r, demand, corner_hz, fit) for r in given)
@@ -220,17 +221,28 @@ def identify_with_path(
 
 
 def _with_true_speed(
-    task: Task, trials: list[Trial], again: Callable[[Task], list[Trial]]
+    task: Task, path: SignalPath, trials_of: Callable[[Task], list[Trial]]
 ) -> tuple[Task, list[Trial]]:
-    """Task and trials without the reported speed where it contradicts the position, else the same.
+    """Task and trials without the reported speed where it contradicts the position, else with it.
 
-    Decided before anything else: a late speed looks like mechanics, or like a late torque.
+    Decided before anything else: a late speed looks like mechanics, or like a late torque. Where
+    both already differ by more than delay and lag, the position is tried alone first: a search for
+    mechanics that explain both takes long, and finds none. ``path`` is any one of the trials.
     """
     shown = all(r.position is not None and not r.excitation.segments for r in task.records)
-    if not task.speed_used or not shown or not speed_suspect(trials[0].solution):
+    if not task.speed_used or not shown:
+        return task, trials_of(task)
+    alone, others = task.without_speed(), list[Trial]()
+    views = task.views(path, None)
+    if views.position is not None and signals_differ(views.velocity, views.position, path):
+        others = trials_of(alone)
+        both = task.trial(others[0].path, None, None, others[0].solution)
+        if surely_contradicts(both.solution, others[0].solution):
+            return alone, others
+    trials = trials_of(task)
+    if not speed_suspect(trials[0].solution):
         return task, trials
-    alone = task.without_speed()
-    others = again(alone)
+    others = others or trials_of(alone)
     contradicts = speed_contradicts(trials[0].solution, others[0].solution)
     return (alone, others) if contradicts else (task, trials)
 
@@ -252,7 +264,7 @@ def _by_motion(
     odd = _odd(task, paths[0], corner_known)
     trials: list[Trial] = []
     if not odd:
-        task, trials = _with_true_speed(task, task.trials(paths), lambda t: t.trials(paths))
+        task, trials = _with_true_speed(task, paths[0], lambda t: t.trials(paths))
     if trials and not _suspect(task, trials[0], corner_known):
         return task, trials, False
     alone = replace(task, records=tuple(replace(record, torque=None) for record in task.records))
@@ -261,9 +273,10 @@ def _by_motion(
     found: list[Trial] = []
     for corner in (reported or USUAL_CURRENT_HZ, threshold.SLOW_HZ):
         begun = replace(likeliest, current_bandwidth_hz=corner)
-        tried = _of_both_holds(alone, begun)
-        if not found:
-            alone, tried = _with_true_speed(alone, tried, partial(_of_both_holds, path=begun))
+        if found:
+            tried = alone.of_both_holds(begun)
+        else:
+            alone, tried = _with_true_speed(alone, begun, partial(Task.of_both_holds, path=begun))
         tried = sorted([alone.by_motion(tried[0]), *tried[1:]], key=rank)
         # Mechanics imitate a slow torque, and fit a little better by it: it has to explain more.
         better = not found or _explains(
@@ -283,11 +296,6 @@ def _by_motion(
     if _explains(best, trials[0].fit, threshold.BY_MOTION, threshold.CLEARLY):
         return alone, found, True
     return task, trials, False
-
-
-def _of_both_holds(task: Task, path: SignalPath) -> list[Trial]:
-    """Trials with this path's corner and each hold at its best cycles, best first."""
-    return sorted((task.at_cycles(path, hold) for hold in _HOLDS), key=rank)
 
 
 def _explained(fit: SampledFit) -> bool:

@@ -43,8 +43,8 @@ def with_one_more(problem: Problem, found: Found) -> list[FloatArray]:
     images = max(1, round(threshold.SEARCHED_HZ * problem.period_s))
     sampler = view.sampler.thinned(lines).nearest(images).single()
     every = sampler.frequency_hz
-    late = delay_response(every, float(found.x[2]) * problem.period_s).astype(np.complex64)
-    further = problem.further(found.x, view, every)
+    late = sampler.late(float(found.x[2]) * problem.period_s).astype(np.complex64)
+    further = problem.further(found.x, view, sampler)
     if further is not None:
         further = further.astype(np.complex64)
     measured = view.g[lines].astype(np.complex64)

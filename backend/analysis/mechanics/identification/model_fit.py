@@ -56,6 +56,7 @@ def fit_sampled_model(
     loop: LoopModel | None = None,
     max_modes: int = 4,
     longest_delay_s: float | None = None,
+    to_whole_cycles: bool = False,
     start: Solution | None = None,
     inertia: KnownInertia | None = None,
 ) -> Solution:
@@ -65,8 +66,10 @@ def fit_sampled_model(
     the position of the same recording, with the same lines; one of them may be None. Lines up to
     0.4 of the sample rate with enough coherence are used. Where no fit without a delay explains the
     data, a delay up to ``longest_delay_s`` is searched for (default: three bus cycles in torque
-    mode, a quarter of one in a closed loop). With ``start`` only the parameters of another solution
-    are refined. ``inertia`` is that of the whole axis, where moves have shown it.
+    mode, a quarter of one in a closed loop). With ``to_whole_cycles`` the mechanics are not
+    searched for again where that delay is nearer to whole cycles than to none: a path can have
+    those. With ``start`` only the parameters of another solution are refined. ``inertia`` is that
+    of the whole axis, where moves have shown it.
 
     Raises:
         ValueError: too few lines are coherent.
@@ -88,7 +91,7 @@ def fit_sampled_model(
     free_filter = path.response_bandwidth_hz is None and from_position is not None
     if start is None:
         plain = Problem(views, period_s, CHAIN, free_filter, inertia=inertia)
-        found, form = _best(plain, longest_delay_s, max_modes)
+        found, form = _best(plain, longest_delay_s, max_modes, to_whole_cycles=to_whole_cycles)
     else:
         form = start.problem.form
         again = Problem(views, period_s, form, free_filter, inertia=inertia)
@@ -146,15 +149,20 @@ def _spread(found: Found) -> FloatArray:
     return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
 
-def _best(chain: Problem, longest_delay_s: float, max_modes: int) -> tuple[Found, Form]:
+def _best(
+    chain: Problem, longest_delay_s: float, max_modes: int, *, to_whole_cycles: bool
+) -> tuple[Found, Form]:
     """The chain with the best criterion, or free modes where they are much better."""
     views, period_s = chain.views, chain.period_s
     found = _grown(chain, _rigid_start(views[0], 0.0), max_modes)
-    if found.error > 0.05:
+    if found.error > max(threshold.LATE, threshold.ABOVE_NOISE * found.noise):
         # There may be a delay that no path shows.
-        late = np.arange(0.25 * period_s, longest_delay_s + 1e-9, 0.25 * period_s) / period_s
+        step_s = (0.5 if to_whole_cycles else 0.25) * period_s
+        late = np.arange(step_s, longest_delay_s + 1e-9, step_s) / period_s
         tried = [_grown(chain, _rigid_start(views[0], float(d)), 1) for d in late]
         start = min([found, *tried], key=lambda t: t.score)
+        if start is not found and to_whole_cycles and round(float(start.x[2])):
+            return start, CHAIN
         if start is not found:
             again = _rigid_start(views[0], float(start.x[2]))
             found = min(found, _grown(chain, again, max_modes), key=lambda t: t.score)

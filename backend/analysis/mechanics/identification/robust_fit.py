@@ -1,7 +1,8 @@
 """Levenberg-Marquardt with bounds and a robust loss, for problems with few parameters.
 
-Value and slopes come from one call, and steps from the normal equations: with some hundred
-residuals and a dozen parameters that is several times faster than a general solver.
+Value and slopes come from one call, the slopes only of steps that are accepted, and steps from the
+normal equations: with some hundred residuals and a dozen parameters that is several times faster
+than a general solver.
 Sources: Marquardt, J. SIAM 11 (1963) 431; Triggs et al., "Bundle adjustment: a modern
 synthesis" (2000), section 4.3 (robust costs by reweighting).
 """
@@ -16,7 +17,8 @@ import numpy as np
 from backend.analysis.signals.arrays import FloatArray
 from backend.analysis.thresholds import robust_fit as threshold
 
-Evaluate = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
+#: Residuals [n], and a function for their slopes [n, m], which a rejected step does not need.
+Evaluate = Callable[[FloatArray], tuple[FloatArray, Callable[[], FloatArray]]]
 
 
 @dataclass(frozen=True)
@@ -38,32 +40,31 @@ def minimise(
 ) -> Minimum:  # fmt: skip
     """Minimise the cost near ``start`` within ``low`` and ``high``.
 
-    ``evaluate`` returns residuals [n] and their slopes [n, m]; residuals much beyond ``scale``
-    count linearly. It ends when the cost falls by less than its tolerance (relative), when steps
-    become small, or after ``steps`` evaluations.
+    ``evaluate`` returns residuals [n] and a function for their slopes [n, m]; residuals much beyond
+    ``scale`` count linearly. It ends when the cost falls by less than its tolerance (relative),
+    when steps become small, or after ``steps`` evaluations.
     """
     x = np.clip(start, low, high)
-    r, slopes = evaluate(x)
+    r, slopes_of = evaluate(x)
+    slopes = slopes_of()
+    gradient, hessian = _normal(r, slopes, scale)
     cost = _cost(r, scale)
     damping = 1e-3
     quiet = 0
     for _ in range(steps - 1):
-        weight = 1.0 / np.sqrt(1.0 + (r / scale) ** 2)
-        weighted = slopes * weight[:, None]
-        gradient = weighted.T @ r
-        hessian = weighted.T @ slopes
         # A parameter at its bound whose step would cross it is kept fixed.
         free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
         if not free.any():
             break
         step = _step(hessian, gradient, free, damping)
         tried = np.clip(x + step, low, high)
-        new_r, new_slopes = evaluate(tried)
+        new_r, new_slopes_of = evaluate(tried)
         new_cost = _cost(new_r, scale)
         moved = float(np.max(np.abs(tried - x)))
         if new_cost < cost:
             quiet = quiet + 1 if cost - new_cost < cost_tolerance * cost else 0
-            x, r, slopes, cost = tried, new_r, new_slopes, new_cost
+            x, r, slopes, cost = tried, new_r, new_slopes_of(), new_cost
+            gradient, hessian = _normal(r, slopes, scale)
             damping = max(damping / 7.0, threshold.LEAST_DAMPING)
             if quiet == 2 or moved < step_tolerance:
                 break
@@ -73,6 +74,12 @@ def minimise(
                 break
     root = (1.0 + (r / scale) ** 2) ** -0.25
     return Minimum(x, cost, r, slopes * root[:, None])
+
+
+def _normal(r: FloatArray, slopes: FloatArray, scale: float) -> tuple[FloatArray, FloatArray]:
+    """Gradient [m] and approximate Hessian [m, m] of the cost."""
+    weighted = slopes * (1.0 / np.sqrt(1.0 + (r / scale) ** 2))[:, None]
+    return np.asarray(weighted.T @ r), np.asarray(weighted.T @ slopes)
 
 
 def _cost(r: FloatArray, scale: float) -> float:

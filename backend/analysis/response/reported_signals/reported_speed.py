@@ -15,10 +15,18 @@ import scipy
 
 from backend.analysis.mechanics.identification.model_fit import Solution
 from backend.analysis.response.frf import Frf
-from backend.analysis.signals.arrays import FloatArray
+from backend.analysis.response.signal_path.sampling import (
+    DIRECT_SHARE,
+    SignalPath,
+    lag_response,
+)
+from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.analysis.signals.line_spectra import Record
 from backend.analysis.thresholds import model_fit
 from backend.analysis.thresholds import reported_speed as threshold
+
+#: Corners of a lag between both signals that are tried: those that a fit may have.
+_CORNERS_HZ = np.geomspace(100.0, 20_000.0, 40)
 
 
 def with_position_speed(record: Record) -> Record:
@@ -46,6 +54,55 @@ def without_weight(frf: Frf) -> Frf:
     """Return an estimate whose lines are stated as unknown, so that another estimate decides."""
     unknown = np.full(frf.frequency_hz.size, threshold.UNKNOWN_DB)
     return replace(frf, std_db=unknown, std_deg=unknown)
+
+
+def signals_differ(velocity: Frf, position: Frf, path: SignalPath) -> bool:
+    """Whether speed and position differ by clearly more than a delay and one lag, without a model.
+
+    Images are neglected: it only decides what is tried first.
+    """
+    f = velocity.frequency_hz
+    use = np.asarray(
+        (f <= DIRECT_SHARE * path.sample_rate_hz)
+        & (velocity.coherence > threshold.COHERENT)
+        & (position.coherence > threshold.COHERENT)
+    )
+    if np.count_nonzero(use) < threshold.FEW:
+        return False
+    f, ratio = f[use], velocity.response[use] / position.response[use]
+    # An estimate is free of a known filter of the speed.
+    corners: list[float | None] = [None]
+    if path.response_bandwidth_hz is None:
+        corners += [float(hz) for hz in _CORNERS_HZ]
+    left = min(_without_delay(ratio / lag_response(f, hz), f) for hz in corners)
+    return left > threshold.UNEXPLAINED / threshold.CLEARLY
+
+
+def _without_delay(ratio: ComplexArray, f: FloatArray) -> float:
+    """Median size of the logarithm of a ratio [lines] without the delay that fits it best."""
+    logs = np.log(np.abs(ratio)) + 1j * np.unwrap(np.angle(ratio))
+    late = float(f @ logs.imag / (f @ f))
+    return float(np.median(np.abs(logs - 1j * late * f)))
+
+
+def surely_contradicts(both: Solution, alone: Solution) -> bool:
+    """Whether `speed_contradicts` for any mechanics: ``both`` begun from those of ``alone``.
+
+    The misfits of speed and position differ, line by line, by the ratio of the two signals, in
+    which mechanics cancel but for their images. With any mechanics one of the two is therefore left
+    with half of that difference at least, whichever it is.
+    """
+    values, _ = both.problem.logs(both.x)
+    if len(values) < 2:
+        return False
+    use = np.min([view.weight for view in both.problem.views[:2]], axis=0) > 0.0
+    if np.count_nonzero(use) < threshold.FEW:
+        return False
+    least = 0.5 * float(np.median(np.abs(values[0] - values[1])[use]))
+    noise = _left(both)[0][1]
+    by_place = _left(alone)[-1][0]
+    unexplained = max(threshold.UNEXPLAINED, threshold.ABOVE_NOISE * noise)
+    return least > unexplained and by_place < threshold.CLEARLY * least
 
 
 def speed_suspect(solution: Solution) -> bool:

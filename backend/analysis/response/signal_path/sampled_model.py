@@ -8,7 +8,9 @@ the model instead of biasing it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -133,25 +135,50 @@ class Sampler:
         own = -np.sum(self.controller * plants * driven, axis=-2)
         return np.asarray(measured / ((self.command + own) * self.as_reported))
 
+    def late(self, delay_s: float) -> ComplexArray:
+        """Return the response of a pure delay [images, lines], by its parts of both axes."""
+        lines = self.frequency_hz[self.true]
+        turns = self.frequency_hz[:, 0] - lines[0]
+        return np.asarray(
+            delay_response(turns, delay_s)[:, None] * delay_response(lines, delay_s)[None, :]
+        )
+
+    @cached_property
+    def _controlled(self) -> bool:
+        """Whether a loop is closed at all."""
+        return bool(np.any(self.controller))
+
     def seen(
         self, plant: ComplexArray, further: ComplexArray | None = None
-    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    ) -> tuple[ComplexArray, Callable[[], tuple[ComplexArray, ComplexArray]]]:
         """Return what the direct estimate gives for this plant [images, lines].
 
-        Also its slopes [images, lines] by the plant and by ``further``, a factor in the path of the
-        evaluated signal alone.
+        Also a function for its slopes [images, lines] by the plant and by ``further``, a factor in
+        the path of the evaluated signal alone; they are often not needed.
         """
         seen_as = self.seen_as if further is None else self.seen_as * further
+        if not self._controlled:
+            command = self.command * self.as_reported
+            shown = seen_as * self.torque / command
+            value = np.einsum("il,il->l", shown, plant)
+
+            def by_both() -> tuple[ComplexArray, ComplexArray]:
+                return shown, np.asarray(self.seen_as * plant * self.torque / command)
+
+            return np.asarray(value), by_both
         inner = 1.0 / (1.0 + self.controller * plant)
         driven = self.torque * inner
-        measured = np.sum(seen_as * plant * driven, axis=0)
-        own = -np.sum(self.controller * plant * driven, axis=0)
+        moved = plant * driven
+        measured = np.einsum("il,il->l", seen_as, moved)
+        own = -np.einsum("il,il->l", self.controller, moved)
         whole = (self.command + own) * self.as_reported
-        squared = driven * inner
-        slope = seen_as * squared / whole
-        slope = slope + measured / whole**2 * self.as_reported * self.controller * squared
-        by_further = self.seen_as * plant * driven / whole
-        return np.asarray(measured / whole), np.asarray(slope), np.asarray(by_further)
+
+        def slopes() -> tuple[ComplexArray, ComplexArray]:
+            by_own = self.controller * (measured / whole**2 * self.as_reported)
+            by_plant = driven * inner * (seen_as / whole + by_own)
+            return np.asarray(by_plant), np.asarray(self.seen_as * moved / whole)
+
+        return np.asarray(measured / whole), slopes
 
 
 def seen_response(

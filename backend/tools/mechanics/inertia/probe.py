@@ -49,8 +49,24 @@ class Probed:
     rated_nm: float
 
 
+@dataclass(frozen=True)
+class Standing:
+    """Torque of the speed loop at standstill: its mean [Nm], and its ripple in % of rated torque.
+
+    The ripple is the RMS of some readings about their trend.
+    """
+
+    torque_nm: float
+    ripple_percent: float
+
+
 async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -> float:
-    """Mean torque [Nm] with which the speed loop holds the axis at standstill.
+    """Mean torque [Nm] with which the speed loop holds the axis at standstill, as `standing`."""
+    return (await standing(axis, session, facts)).torque_nm
+
+
+async def standing(axis: Axis, session: CyclicSession, facts: AxisFacts) -> Standing:
+    """Torque with which the speed loop holds the axis at standstill.
 
     A load with a static torque would fall as soon as the loop is opened.
 
@@ -98,7 +114,10 @@ async def holding_torque(axis: Axis, session: CyclicSession, facts: AxisFacts) -
             np_rpm=float(np.mean(turning)),
             np_percent=float(np.mean(torque)),
         )
-    return float(np.mean(torque)) / 100.0 * facts.rated_torque_nm
+    trend = np.polynomial.Legendre.fit(np.arange(torque.size), torque, 1)
+    rest = torque - trend(np.arange(torque.size))
+    ripple = float(np.sqrt(np.sum(rest**2) / max(torque.size - 2, 1)))
+    return Standing(float(np.mean(torque)) / 100.0 * facts.rated_torque_nm, ripple)
 
 
 def _known(name: str, pairs: Sequence[tuple[Reading, Reading]]) -> list[tuple[int, int]]:

@@ -8,9 +8,10 @@ import numpy.typing as npt
 from backend.axes.axis.axis import Axis
 from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
-from backend.tools.measuring.axis_facts import read_facts
+from backend.tools.measuring.axis_facts import AxisFacts, read_facts
 from backend.tools.measuring.recording import (
     Play,
+    Recording,
     bus_limits,
     cycle_s,
     enabled,
@@ -56,23 +57,59 @@ async def step_response(
         OutOfRange: the step exceeds the envelope; nothing has moved.
         NotAllowed: the envelope or a fault ended it.
     """
-    units, rate = await axis.require_certain_scales(), 1.0 / cycle_s(session)
-    speed = settings.kind == "speed"
-    mode = Mode.CSV if speed else Mode.CSP
-    require_signals(axis, session, mode, False)
+    demand = _demand(settings, 1.0 / cycle_s(session))
+    require_signals(axis, session, _mode(settings), False)
+    await axis.require_certain_scales()
     facts = await read_facts(axis, settings.rated_torque_nm)
-    demand = _demand(settings, rate)
     home = await axis.position_raw()
-    async with (
-        stopping_hard(axis, settings.envelope.speed_rpm),
-        enabled(axis, session, mode) as start,
-    ):
+    async with stopping_hard(axis, settings.envelope.speed_rpm):
+        recording = await _played(axis, session, settings, demand, facts, progress)
+    # First of all, so that the measurement is not lost if the way back fails.
+    if keep is not None:
+        keep("step", *raw_of(recording, demand, settings, facts))
+    if not stays:
+        await go_back(axis, session, home, settings.envelope, facts)
+    return evaluate(recording, demand, settings, facts.rated_torque_nm)
+
+
+async def one_more_step(
+    axis: Axis, session: CyclicSession, settings: StepSettings, facts: AxisFacts
+) -> StepResult:
+    """Play another step as `step_response` did before, and stay where the axis has come to rest.
+
+    The caller has the `facts`, and lets a quick stop brake hard (`stopping_hard`) meanwhile.
+
+    Raises:
+        OutOfRange: the step exceeds the envelope; nothing has moved.
+        NotAllowed: the envelope or a fault ended it.
+    """
+    demand = _demand(settings, 1.0 / cycle_s(session))
+    silent = Progress(lambda: None)
+    recording = await _played(axis, session, settings, demand, facts, silent)
+    return evaluate(recording, demand, settings, facts.rated_torque_nm)
+
+
+def _mode(settings: StepSettings) -> Mode:
+    return Mode.CSV if settings.kind == "speed" else Mode.CSP
+
+
+async def _played(
+    axis: Axis,
+    session: CyclicSession,
+    settings: StepSettings,
+    demand: npt.NDArray[np.float64],
+    facts: AxisFacts,
+    progress: Progress,
+) -> Recording:
+    """Play the demand [n] in rpm or rev, within the envelope around the present position."""
+    units, mode = await axis.require_certain_scales(), _mode(settings)
+    async with enabled(axis, session, mode) as start:
         await quiet(axis)
-        if speed:
+        if mode is Mode.CSV:
             raw = np.round(demand * (units.velocity_raw(1e6) / 1e6))
         else:
             raw = start + np.round(demand * (units.position_raw(1e6) / 1e6))
-        recording = await play(
+        return await play(
             axis,
             session,
             Play(mode, raw.astype(np.int64)),
@@ -80,12 +117,6 @@ async def step_response(
             facts.rated_torque_nm,
             share(progress, 0.1, 0.85, text("step.stepping")),
         )
-    # First of all, so that the measurement is not lost if the way back fails.
-    if keep is not None:
-        keep("step", *raw_of(recording, demand, settings, facts))
-    if not stays:
-        await go_back(axis, session, home, settings.envelope, facts)
-    return evaluate(recording, demand, settings, facts.rated_torque_nm)
 
 
 def _demand(settings: StepSettings, rate: float) -> npt.NDArray[np.float64]:

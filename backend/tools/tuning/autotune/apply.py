@@ -20,6 +20,7 @@ from backend.tools.tuning.autotune.time_budget import TimeLeft
 from backend.tools.tuning.autotune.verification.verify import (
     HUM_PERCENT,
     Check,
+    Hums,
     Keep,
     Verified,
     of_candidate,
@@ -80,6 +81,7 @@ async def first_kept(
             tried.append(of_candidate(candidate, error.text))
             continue
         earlier = {key: await axis.drive.raw(key) for key in raw}
+        share: float | None
         # On the restore list: if this server is killed now, the next one undoes the unverified
         # values.
         with axis.drive.pending_restores.temporary(earlier):
@@ -95,16 +97,19 @@ async def first_kept(
                 if await ends_all(axis, error):
                     raise
                 tried.append(of_candidate(candidate, error.text))
-                continue
+                if not isinstance(error, Hums):
+                    continue
+                share = _quieter_share(error.rms_percent)
             except BaseException:
                 await take_back(axis, before)
                 raise
-            if verified.kept:
-                return Applied(candidate, verified, before, written)
-            if verified.why is not None:
-                tried.append(verified.why)
-            await take_back(axis, before)
-        share = _softer_share(verified)
+            else:
+                if verified.kept:
+                    return Applied(candidate, verified, before, written)
+                if verified.why is not None:
+                    tried.append(verified.why)
+                await take_back(axis, before)
+                share = _softer_share(verified)
         if softer is not None and share is not None and softened < threshold.SOFTENED:
             softened += 1
             less = await softer(candidate, share)
@@ -116,9 +121,16 @@ async def first_kept(
 def _softer_share(verified: Verified) -> float | None:
     """Share of a failed design's gains with which it would be kept; None where it is not known."""
     if verified.hum_percent is not None:
-        # The torque ripple that sensor noise causes is proportional to the gain.
-        return threshold.QUIETER * HUM_PERCENT / verified.hum_percent
+        return _quieter_share(verified.hum_percent)
     return verified.share_to_show
+
+
+def _quieter_share(rms_percent: float) -> float:
+    """Share of the gains with which the axis stands quietly enough.
+
+    The torque ripple that sensor noise causes is proportional to the gain.
+    """
+    return threshold.QUIETER * HUM_PERCENT / rms_percent
 
 
 def _in_turn(waiting: Sequence[Candidate], hummed: Candidate, less: Candidate) -> list[Candidate]:

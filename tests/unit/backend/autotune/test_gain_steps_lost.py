@@ -41,6 +41,10 @@ async def raised(
         return after
 
     @asynccontextmanager
+    async def stopping_hard(*_: Any) -> AsyncIterator[None]:
+        yield
+
+    @asynccontextmanager
     async def temporary(*_: Any) -> AsyncIterator[None]:
         yield
 
@@ -51,7 +55,8 @@ async def raised(
         spec_of=lambda _drive: SimpleNamespace(speed="gain"),
         raised=lambda _drive, _key, now, factor: round(now * factor),
     )
-    monkeypatch.setattr(raising, "step_response", again)
+    monkeypatch.setattr(raising, "one_more_step", again)
+    monkeypatch.setattr(raising, "stopping_hard", stopping_hard)
 
     async def home() -> int:
         return 0
@@ -91,15 +96,21 @@ async def test_single_samples_are_not_missed(monkeypatch: pytest.MonkeyPatch) ->
 
 async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is compared with one of its direction; the last way leads home at the usual gain."""
-    place, returned, gains, stepped = 0.0, [], [1.0], []
+    place, returned, gains, stepped, hard = 0.0, [], [1.0], [], list[bool]()
     ways = {1: 0.4, -1: -0.38}
 
-    async def again(_axis: Any, _session: Any, settings: StepSettings, *rest: Any) -> StepResult:
+    @asynccontextmanager
+    async def stopping_hard(*_: Any) -> AsyncIterator[None]:
+        hard.append(True)
+        yield
+        hard.pop()
+
+    async def again(_axis: Any, _session: Any, settings: StepSettings, _facts: Any) -> StepResult:
         nonlocal place
+        assert hard
         sign = int(np.sign(settings.size))
         stepped.append((sign, round(gains[-1], 2)))
         place += ways[sign]
-        assert rest[-1] is True
         return step(0.1, 0.0)
 
     async def home(*_: Any) -> None:
@@ -127,8 +138,8 @@ async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch)
         raised=lambda _drive, _key, now, factor: round(now * factor),
     )
     for name, value in (
-        ("step_response", again), ("go_back", home), ("temporary", temporary),
-        ("gain_tool", tool),
+        ("one_more_step", again), ("go_back", home), ("temporary", temporary),
+        ("gain_tool", tool), ("stopping_hard", stopping_hard),
     ):  # fmt: skip
         monkeypatch.setattr(raising, name, value)
     drive = SimpleNamespace(
@@ -152,3 +163,32 @@ async def test_steps_lead_away_and_back_in_turn(monkeypatch: pytest.MonkeyPatch)
     returned.clear()
     await raising.gain_steps(axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING)
     assert [number for number, _gain in returned] == [2, 4, 5]
+    # Begun where the step before ended: back first, for comparison, and no way home in between.
+    ways[-1], place = -0.4, 0.4
+    stepped.clear()
+    returned.clear()
+    found = await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.0), 10.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert found.shown_db == pytest.approx(10.0, abs=0.1)
+    assert stepped[0] == (-1, 1.0)
+    assert [sign for sign, _gain in stepped] == [-1, 1, -1, 1, -1]
+    assert all(gain > 1.0 for _sign, gain in stepped[1:])
+    assert [number for number, _gain in returned] == [5]
+    # One raise is compared with the step that there is: no step back.
+    place = 0.4
+    stepped.clear()
+    returned.clear()
+    await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.0), 2.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert [sign for sign, _gain in stepped] == [1]
+    assert [number for number, _gain in returned] == [0, 1]
+    # Too much was lost: nothing is raised, and the axis returns all the same.
+    place = 0.4
+    stepped.clear()
+    returned.clear()
+    found = await raising.gain_steps(
+        axis, NOTHING, SETTINGS, step(0.1, 0.12), 10.0, silent, facts=NOTHING, begun_raw=0
+    )
+    assert (found.steps, stepped, place) == ((), [], 0.0)

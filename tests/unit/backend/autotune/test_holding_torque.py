@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from backend.axes.drive.readings import Reading
@@ -85,3 +86,24 @@ async def test_readings_that_were_lost_do_not_make_the_torque_smaller(
     axis.drive.read_many = read_many
     held = await probe.holding_torque(axis, NOTHING, FACTS)
     assert held == pytest.approx(0.3 * 1.27)
+
+
+async def test_ripple_is_told_from_a_torque_that_drifts(monkeypatch: pytest.MonkeyPatch) -> None:
+    axis = axis_of(monkeypatch, 1)
+    rng = np.random.default_rng(3)
+    percent = 30.0 + np.linspace(-8.0, 8.0, 12)
+
+    async def rippled(rms_percent: float) -> probe.Standing:
+        readings = iter(percent + rms_percent * rng.standard_normal(percent.size))
+
+        async def read_many(keys: list[str]) -> dict[str, Reading]:
+            raw = round(10.0 * next(readings))
+            torque = Reading("6077:00", raw, raw / 10.0, 0.0)
+            return {keys[0]: torque, keys[1]: Reading("606C:00", 0, 0.0, 0.0)}
+
+        axis.drive.read_many = read_many
+        return await probe.standing(axis, NOTHING, FACTS)
+
+    assert (await rippled(0.0)).ripple_percent < 0.1
+    found = [(await rippled(6.0)).ripple_percent for _ in range(20)]
+    assert float(np.mean(found)) == pytest.approx(6.0, rel=0.2)

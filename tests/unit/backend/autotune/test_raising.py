@@ -6,6 +6,7 @@ is late. The true loop is computed from masses, spring and delay alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,12 +24,7 @@ from backend.analysis.response.frf import Frf
 from backend.analysis.signals.arrays import ComplexArray, FloatArray
 from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.tuning.autotune.verification import verdict as tune_verdict
-from backend.tools.tuning.autotune.verification.raising import (
-    by_raised_gain,
-    raised_to,
-    share_to_show,
-    surely_db,
-)
+from backend.tools.tuning.autotune.verification.raising import GainRaise, by_raised_gain
 from backend.tools.tuning.autotune.verification.verdict import misses, verdicts_of, worst_of_paths
 
 MOTOR, LOAD = 3e-5, 1.8e-4
@@ -93,6 +89,10 @@ class Tuned:
         return verdicts_of(AXIS, FACTS, PLANT, self.candidate, self.lines(), "linear", shown_db)
 
 
+def known(tuned: Tuned, verdicts: Sequence[LoopVerdict], goals: Goals = GOALS) -> GainRaise:
+    return GainRaise(AXIS, FACTS, PLANT, tuned.candidate, goals, verdicts)
+
+
 @pytest.fixture(autouse=True)
 def without_a_drive(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tune_verdict, "fixed_of", fixed)
@@ -106,7 +106,7 @@ def test_a_raised_gain_decides_between_paths_that_the_lines_do_not_tell() -> Non
     missed = misses(worst, GOALS)
     assert missed
     assert all(by_raised_gain(each) for each in missed)
-    to_db = raised_to(AXIS, FACTS, PLANT, tuned.candidate, before, GOALS, missed)
+    to_db = known(tuned, before).raised_to(missed)
     assert to_db is not None
     assert GOALS.gain_margin_db < to_db < tuned.true.gain_margin_db
     after = worst_of_paths(tuned.verdicts(to_db))
@@ -136,7 +136,7 @@ def test_a_loop_that_is_late_is_not_kept_unless_it_is_sound(late_s: float) -> No
         missed = misses(worst_of_paths(before), GOALS)
         kept = not missed
         if missed and all(by_raised_gain(each) for each in missed):
-            to_db = raised_to(AXIS, FACTS, PLANT, tuned.candidate, before, GOALS, missed)
+            to_db = known(tuned, before).raised_to(missed)
             shown_db = min(to_db or 0.0, tuned.true.gain_margin_db - 0.1)
             kept = to_db is not None and shown_db >= to_db - 0.1
             kept = kept and not misses(worst_of_paths(tuned.verdicts(shown_db)), GOALS)
@@ -149,15 +149,14 @@ def test_where_no_raise_within_reach_decides_a_softer_design_is_named() -> None:
     tuned, goals = Tuned(40.0), Goals(9.0, 52.0, 1.7)
     before = tuned.verdicts()
     missed = misses(worst_of_paths(before), goals)
-    given = (AXIS, FACTS, PLANT, tuned.candidate, before, goals, missed)
-    assert raised_to(*given) is None
-    share = share_to_show(*given)
+    assert known(tuned, before, goals).raised_to(missed) is None
+    share = known(tuned, before, goals).share_to_show(missed)
     assert share is not None
     assert 0.6 < share < 0.95
     less = Tuned(share * tuned.hz)
     verdicts = less.verdicts()
     missed = misses(worst_of_paths(verdicts), goals)
-    to_db = raised_to(AXIS, FACTS, PLANT, less.candidate, verdicts, goals, missed)
+    to_db = known(less, verdicts, goals).raised_to(missed)
     assert to_db is not None
     assert to_db < less.true.gain_margin_db
     assert not misses(worst_of_paths(less.verdicts(to_db)), goals)
@@ -167,4 +166,4 @@ def test_no_raise_is_sure_where_a_possible_loop_is_not_stable() -> None:
     tuned = Tuned(16.0)
     verdicts = tuned.verdicts()
     assert not all(each.stable for each in verdicts)
-    assert surely_db(AXIS, FACTS, PLANT, tuned.candidate, verdicts) == 0.0
+    assert known(tuned, verdicts).surely_db() == 0.0

@@ -17,6 +17,8 @@ from backend.analysis.loop.margins import Margins
 from backend.foundation.work.jobs import Progress
 from backend.tools.tuning.autotune import apply as tune_apply
 from backend.tools.tuning.autotune.time_budget import TimeLeft
+from backend.tools.tuning.autotune.verification.verify import Hums
+from drivers.cia402 import State
 from drivers.errors import OutOfRange
 from drivers.texts.message import Text, text
 
@@ -42,6 +44,7 @@ async def kept_of(
     time_left: TimeLeft | None = None,
     meanwhile: Callable[[], None] = lambda: None,
     shown_nms: float | None = None,
+    at_standstill: bool = False,
 ) -> tuple[list[float], float | None]:
     """The speed gains that were verified, in turn, and the one that stayed."""
     seen: list[float] = []
@@ -53,6 +56,8 @@ async def kept_of(
         kept = gain <= (shown_nms or QUIET_NMS)
         hum = None if kept or shown_nms else 4.0 * gain / QUIET_NMS
         share = None if kept or not shown_nms else 0.84
+        if hum and at_standstill:
+            raise Hums("autotune.hums", rms_percent=hum)
         return SimpleNamespace(
             kept=kept, why=None if kept else HUMS, hum_percent=hum, share_to_show=share
         )
@@ -71,8 +76,13 @@ async def kept_of(
     for name in ("plan", "write_settings", "put_back_in_time"):
         monkeypatch.setattr(tune_apply, name, nothing)
     monkeypatch.setattr(tune_apply, "verify", verify)
+
+    async def state() -> State:
+        return State.SWITCH_ON_DISABLED
+
     axis: Any = SimpleNamespace(
-        drive=SimpleNamespace(name="X", pending_restores=SimpleNamespace(temporary=temporary))
+        drive=SimpleNamespace(name="X", pending_restores=SimpleNamespace(temporary=temporary)),
+        state=state,
     )
     check: Any = SimpleNamespace(inertia_kgm2=1e-4, motor_inertia_kgm2=None)
     tried: list[Text] = []
@@ -80,13 +90,19 @@ async def kept_of(
     applied = await tune_apply.first_kept(
         axis, session, check, rows, GOALS, tried, Progress(lambda: None), None, softer, time_left
     )
-    assert tried == [HUMS] * (len(seen) - (applied is not None))
+    assert len(tried) == len(seen) - (applied is not None)
+    if not at_standstill:
+        assert tried == [HUMS] * len(tried)
     return seen, None if applied is None else applied.candidate.gains.speed_nms
 
 
-async def test_a_hum_costs_as_much_gain_as_it_must(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("at_standstill", [False, True])
+async def test_a_hum_costs_as_much_gain_as_it_must(
+    monkeypatch: pytest.MonkeyPatch, at_standstill: bool
+) -> None:
     # 0.85 of the gain at which the hum, which goes by the gain, would be at its limit.
-    seen, kept = await kept_of(monkeypatch, [design(10.0), design(8.0), design(2.0)])
+    rows = [design(10.0), design(8.0), design(2.0)]
+    seen, kept = await kept_of(monkeypatch, rows, at_standstill=at_standstill)
     assert kept == pytest.approx(0.85 * QUIET_NMS)
     # With the same filters 8 Nms would hum, too, and is not tried.
     assert seen == [10.0, pytest.approx(0.85 * QUIET_NMS)]

@@ -16,6 +16,7 @@ from backend.analysis.response.frf import Frf
 from backend.axes.axis.axis import Envelope
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.axis_facts import AxisFacts
+from backend.tools.mechanics.inertia.probe import Standing
 from backend.tools.moving.step.evaluate import LEAD_S, StepResult
 from backend.tools.tuning.autotune.time_budget import TimeLeft
 from backend.tools.tuning.autotune.verification import verify as tune_verify
@@ -27,6 +28,7 @@ from backend.tools.tuning.autotune.verification.verdict import (
 )
 from backend.tools.tuning.autotune.verification.verify import (
     Check,
+    Hums,
     Verified,
     bearable,
     hum,
@@ -234,6 +236,7 @@ async def verified_of(
     answers: list[SweepResult],
     time_left: TimeLeft | None = None,
     pairs_before: int = 0,
+    ripple_percent: float = 0.0,
 ) -> tuple[Verified, list[int]]:
     """What a verification makes of these answers, and how many pairs were played for each."""
     pairs: list[int] = []
@@ -246,12 +249,12 @@ async def verified_of(
     async def stepped(*_: object) -> StepResult:
         return step(0.5)
 
-    async def still(*_: object) -> float:
-        return 0.0
+    async def still(*_: object) -> Standing:
+        return Standing(0.0, ripple_percent)
 
     monkeypatch.setattr(tune_verify.sweep_tool, "sweep", sweep)
     monkeypatch.setattr(tune_verify, "step_response", stepped)
-    monkeypatch.setattr(tune_verify, "holding_torque", still)
+    monkeypatch.setattr(tune_verify, "standing", still)
     gains = Gains(0.1, 6.0, 50.0, 60.0)
     nominal = Margins(40.0, 65.0, 40.0, None, None, 1.3, 60.0, True)
     candidate = Candidate((), gains, predicted_hz, None, nominal, GUARANTEED, 0.0, 5.0, 0.1)
@@ -268,6 +271,17 @@ async def verified_of(
     reported = (Progress(lambda: None), Progress(lambda: None), Progress(lambda: None))
     found = await verify(None, None, check, candidate, GUARANTEED, reported, None, time_left)
     return found, pairs
+
+
+async def test_a_torque_that_oscillates_by_far_at_standstill_costs_no_response(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It was measured for 8 to 18 s before the step showed the same."""
+    found, pairs = await verified_of(monkeypatch, 60.0, [loop_swept(1.0)], ripple_percent=7.0)
+    assert (found.kept, pairs) == (True, [1])
+    with pytest.raises(Hums, match=r"8\.5 %") as raised:
+        await verified_of(monkeypatch, 60.0, [], ripple_percent=8.5)
+    assert raised.value.rms_percent == 8.5
 
 
 async def test_another_bandwidth_than_predicted_is_measured_with_more_realisations(

@@ -7,7 +7,7 @@ stable with a raised gain has at least that gain margin, at whatever frequency i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,16 +19,15 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.axis_facts import AxisFacts, si_value
 from backend.tools.measuring.interrupted import ends_all
-from backend.tools.measuring.temporary import temporary
+from backend.tools.measuring.temporary import stopping_hard, temporary
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.step.evaluate import LEAD_S, StepResult, StepSettings
-from backend.tools.moving.step.run import step_response
+from backend.tools.moving.step.run import one_more_step
 from backend.tools.thresholds import autotune_gain_steps as threshold
 from backend.tools.tuning.autotune.design import gains as gain_tool
 from drivers.errors import DriveError
 from drivers.texts.message import text
 
-Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
 _DECAYS = 0.5**0.5
 
 
@@ -57,16 +56,17 @@ async def gain_steps(
     present: StepResult,
     wanted_db: float,
     progress: Progress,
-    keep: Keep | None = None,
     *,
     facts: AxisFacts,
     surely_db: float = 0.0,
+    begun_raw: int | None = None,
 ) -> GainSteps:
     """Raise the speed gain up to ``wanted_db`` with a step at each; restore the gain afterwards.
 
     Up to ``surely_db`` every loop that the axis may have is stable: fewer steps lead there.
     ``present`` is the same step at the unchanged gain. A step of which too many samples were lost
-    shows nothing: no gain is raised further then.
+    shows nothing: no gain is raised further then. Where ``present`` left the axis at its end,
+    ``begun_raw`` is the position where it began; the axis returns there.
 
     A slow loop takes longer to return than to step. Steps therefore lead away and back in turn,
     each compared with one of the same direction at the unchanged gain.
@@ -74,65 +74,113 @@ async def gain_steps(
     Raises:
         DriveError: the drive has a fault, or the link is lost; an oscillation is not an error.
     """
-    drive = axis.drive
-    key = gain_tool.spec_of(drive).speed
-    if key is None or not received(present, settings):
-        return GainSteps(0.0, None, ())
-    parameter = drive.parameter(key)
-    now = await drive.raw(key)
-    value = si_value(parameter, float(parameter.to_value(now)))
-    home, envelope = await axis.position_raw(), settings.envelope
-    directions = {False: settings, True: replace(settings, size=-settings.size)}
-    unchanged = {False: present}
-    away = moved = False
+    key = gain_tool.spec_of(axis.drive).speed
+    away = begun_raw is not None
+    home = await axis.position_raw() if begun_raw is None else begun_raw
+    series = _Series(axis, session, settings, facts, home, {False: present}, away, away)
     done: list[GainStep] = []
-    levels = levels_to(wanted_db, surely_db)
-    for db in levels:
-        raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
-        held = si_value(parameter, float(parameter.to_value(raw)))
-        if not value or not held or held <= value * 1.01:
-            break
-        real_db = float(20.0 * np.log10(held / value))
-        if done and real_db < done[-1].gain_db + 0.1:
-            break
-        progress(len(done) / len(levels), text("autotune.db-more-gain", real_db=real_db))
-        back, silent = away, Progress(lambda: None)
-        async with temporary(axis, {key: raw}):
-            try:
-                step = await step_response(axis, session, directions[back], silent, keep, True)
-            except DriveError as error:
-                if await ends_all(axis, error):
-                    raise
-                done.append(GainStep(real_db, float("inf"), False))
-                moved = False
-                break
-        away, moved = not back, True
-        if not received(step, settings):
-            break
-        done.append(judged(step, unchanged[back], settings, real_db))
-        if not done[-1].stable or len(done) == len(levels):
-            break
-        if True not in unchanged:
-            unchanged[True] = await step_response(
-                axis, session, directions[True], silent, keep, True
-            )
-            away = False
-            if not received(unchanged[True], settings):
-                break
-        if not away and await _elsewhere(axis, home, settings):
-            await go_back(axis, session, home, envelope, facts)
-    if moved:
-        await go_back(axis, session, home, envelope, facts)
+    async with stopping_hard(axis, settings.envelope.speed_rpm):
+        if key is not None and received(present, settings):
+            levels = levels_to(wanted_db, surely_db)
+            if await series.begins(len(levels)):
+                done = await series.raised(key, levels, progress)
+        if series.moved:
+            await series.return_home()
     shown = [each.gain_db for each in done if each.stable]
     onset = next((each.gain_db for each in done if not each.stable), None)
     return GainSteps(max(shown, default=0.0), onset, tuple(done))
 
 
-async def _elsewhere(axis: Axis, home_raw: int, settings: StepSettings) -> bool:
-    """Whether the axis came back too far from where its steps begin to compare their torques."""
-    off_rev = (await axis.units()).position(await axis.position_raw() - home_raw)
-    way_rev = settings.size / 60.0 * settings.hold_s
-    return abs(off_rev) > threshold.BACK * abs(way_rev)
+@dataclass
+class _Series:
+    """Steps away from ``home_raw`` and back in turn; a quick stop brakes hard meanwhile.
+
+    ``unchanged`` holds the steps at the unchanged gain, away (False) and back (True). ``moved``:
+    whether the axis has to return at the end.
+    """
+
+    axis: Axis
+    session: CyclicSession
+    settings: StepSettings
+    facts: AxisFacts
+    home_raw: int
+    unchanged: dict[bool, StepResult]
+    away: bool
+    moved: bool
+
+    async def begins(self, count: int) -> bool:
+        """Whether so many steps can begin: at home, and where several do, with one back."""
+        if self.away and count == 1:
+            await self.return_home()
+        elif self.away:
+            return await self._back_unchanged()
+        return True
+
+    async def raised(self, key: str, levels: Sequence[float], progress: Progress) -> list[GainStep]:
+        """Steps at these raises [dB] of the gain ``key``, up to the first that is not stable."""
+        drive, parameter = self.axis.drive, self.axis.drive.parameter(key)
+        now = await drive.raw(key)
+        value = si_value(parameter, float(parameter.to_value(now)))
+        done: list[GainStep] = []
+        for db in levels:
+            raw = gain_tool.raised(drive, key, now, float(10 ** (db / 20.0)))
+            held = si_value(parameter, float(parameter.to_value(raw)))
+            if not value or not held or held <= value * 1.01:
+                break
+            real_db = float(20.0 * np.log10(held / value))
+            if done and real_db < done[-1].gain_db + 0.1:
+                break
+            progress(len(done) / len(levels), text("autotune.db-more-gain", real_db=real_db))
+            back = self.away
+            async with temporary(self.axis, {key: raw}):
+                try:
+                    step = await self._step(back=back)
+                except DriveError as error:
+                    if await ends_all(self.axis, error):
+                        raise
+                    done.append(GainStep(real_db, float("inf"), False))
+                    self.moved = False
+                    break
+            self.away, self.moved = not back, True
+            if not received(step, self.settings):
+                break
+            done.append(judged(step, self.unchanged[back], self.settings, real_db))
+            if not done[-1].stable or len(done) == len(levels):
+                break
+            if True not in self.unchanged:
+                if not await self._back_unchanged():
+                    break
+            elif not self.away:
+                await self._home_again()
+        return done
+
+    async def return_home(self) -> None:
+        """Go back to where steps begin."""
+        envelope = self.settings.envelope
+        await go_back(self.axis, self.session, self.home_raw, envelope, self.facts)
+        self.away = False
+
+    async def _back_unchanged(self) -> bool:
+        """Step back at the unchanged gain; False where too many of its samples were lost."""
+        self.unchanged[True] = await self._step(back=True)
+        self.away = False
+        if not received(self.unchanged[True], self.settings):
+            return False
+        await self._home_again()
+        return True
+
+    async def _step(self, *, back: bool) -> StepResult:
+        size = -self.settings.size if back else self.settings.size
+        settings = replace(self.settings, size=size)
+        return await one_more_step(self.axis, self.session, settings, self.facts)
+
+    async def _home_again(self) -> None:
+        """Go back where the axis came back too far from where its steps begin to be compared."""
+        off = await self.axis.position_raw() - self.home_raw
+        off_rev = (await self.axis.units()).position(off)
+        way_rev = self.settings.size / 60.0 * self.settings.hold_s
+        if abs(off_rev) > threshold.BACK * abs(way_rev):
+            await self.return_home()
 
 
 def levels_to(wanted_db: float, surely_db: float = 0.0) -> list[float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -22,20 +22,14 @@ from backend.axes.axis.cyclic import CyclicSession
 from backend.foundation.work.jobs import Progress
 from backend.tools.measuring.axis_facts import AxisFacts
 from backend.tools.measuring.recording import quiet
-from backend.tools.mechanics.inertia.probe import holding_torque
+from backend.tools.mechanics.inertia.probe import standing
 from backend.tools.moving.moves.go_back import go_back
 from backend.tools.moving.step import evaluate as step_evaluation
 from backend.tools.moving.step.run import step_response
 from backend.tools.thresholds import autotune_verify as threshold
 from backend.tools.tuning.autotune.time_budget import NOT_AGAIN, TimeLeft
 from backend.tools.tuning.autotune.verification.gain_steps import GainSteps, gain_steps, steps_to
-from backend.tools.tuning.autotune.verification.raising import (
-    by_raised_gain,
-    not_shown,
-    raised_to,
-    share_to_show,
-    surely_db,
-)
+from backend.tools.tuning.autotune.verification.raising import GainRaise, by_raised_gain, not_shown
 from backend.tools.tuning.autotune.verification.reference import reference_for
 from backend.tools.tuning.autotune.verification.verdict import (
     COHERENT,
@@ -54,6 +48,7 @@ from backend.tools.tuning.autotune.verification.verdict import (
 )
 from backend.tools.tuning.sweep import evaluation as sweep_evaluation
 from backend.tools.tuning.sweep import run as sweep_tool
+from drivers.errors import NotAllowed
 from drivers.texts.message import Text, joined, prose, text
 
 Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], None]
@@ -61,6 +56,15 @@ Keep = Callable[[str, dict[str, npt.NDArray[np.generic]], dict[str, object]], No
 MOST_PAIRS = threshold.MOST_PAIRS
 LOOKS = threshold.LOOKS
 HUM_PERCENT = threshold.HUM_PERCENT
+
+
+class Hums(NotAllowed):
+    """The torque of the standing axis oscillates by far: no response need be measured for that."""
+
+    @property
+    def rms_percent(self) -> float:
+        """RMS of the torque, in % of rated torque."""
+        return float(str(self.text.params["rms_percent"]))
 
 
 @dataclass(frozen=True)
@@ -131,11 +135,14 @@ async def verify(
     where the first pair shows too little, or another bandwidth than predicted.
 
     Raises:
+        Hums: the torque oscillates at standstill by far: nothing else was measured.
         NotAllowed: the axis does not hold standstill, or the envelope or a fault ended it.
     """
-    standing, measuring, stepping = reported
-    standing(0.0, prose(""))
-    await holding_torque(axis, session, check.facts)
+    waiting, measuring, stepping = reported
+    waiting(0.0, prose(""))
+    ripple = (await standing(axis, session, check.facts)).ripple_percent
+    if ripple > threshold.SURELY_HUMS * HUM_PERCENT:
+        raise Hums("autotune.hums", rms_percent=ripple)
     if check.home_raw is not None:
         await quiet(axis)
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
@@ -167,9 +174,9 @@ async def verify(
     verdicts = _verdicts(axis, check, candidate, judged, None)
     verdict = _worst(verdicts)
     above = tuple(each for each in _misses(verdict, guaranteed) if by_raised_gain(each))
-    known = (axis, check.facts, check.plant, candidate)
-    raised_db = raised_to(*known, verdicts, guaranteed, above) if above else None
-    clock.require_raising(steps_to(raised_db, surely_db(*known, verdicts)) if raised_db else 0)
+    known = GainRaise(axis, check.facts, check.plant, candidate, guaranteed, verdicts)
+    raised_db = known.raised_to(above) if above else None
+    clock.require_raising(steps_to(raised_db, known.surely_db()) if raised_db else 0)
     pairs = clock.pairs(took_s, MOST_PAIRS, looks)
     missed = worse_than(guaranteed, read)
     blurred = any(each.end == "measured" for each in _misses(verdict, guaranteed))
@@ -184,54 +191,43 @@ async def verify(
         missed = worse_than(guaranteed, sharp_margins(more))
         if blurred and sharp_lines(more.frf) is not None:
             judged = more
-            verdicts = _verdicts(axis, check, candidate, judged, None)
-            verdict = _worst(verdicts)
+            known = replace(known, verdicts=_verdicts(axis, check, candidate, judged, None))
+            verdict = _worst(known.verdicts)
         swept, read = _joined(swept, read, more)
     if again.left_out:
         clock.give_up(NOT_AGAIN)
     measured = _width_of(read)
     beyond = _misses(verdict, guaranteed)
     open_above = tuple(each for each in beyond if by_raised_gain(each))
-    raised_db = raised_to(*known, verdicts, guaranteed, open_above) if open_above else None
+    raised_db = known.raised_to(open_above) if open_above else None
     missed = missed or in_words(tuple(each for each in beyond if each not in open_above))
     share: float | None = None
     if open_above and raised_db is None and not missed:
         # No gain that may be tried shows it.
         missed = in_words(open_above)
-        share = share_to_show(*known, verdicts, guaranteed, open_above)
+        share = known.share_to_show(open_above)
     why = _named(candidate, missed)
     shown: GainSteps | None = None
     step: step_evaluation.StepResult | None = None
     only_hums = False
     if why is None:
-        settings_of_step = usual = _step_settings(check, candidate)
+        steps = _Steps(axis, session, check, stepping, keep, stays=raised_db is not None)
+        settings_of_step = _step_settings(check, candidate)
         stepped_s = time.monotonic()
-        step = await step_response(axis, session, settings_of_step, stepping, keep)
-        steps = [step]
+        step = await steps.made(settings_of_step)
         larger = min(step_evaluation.significant_size(step), _largest_step(check, candidate))
         wanted = step.widened and larger > threshold.WORTH_A_STEP * settings_of_step.size
         # Without time for it the settling window stays as wide as the noise, and says so.
         if wanted and clock.allows(time.monotonic() - stepped_s):
             settings_of_step = replace(settings_of_step, size=larger)
-            step = await step_response(axis, session, settings_of_step, stepping, keep)
-            steps.append(step)
-        present = step
+            step = await steps.made(settings_of_step)
         hums, restless_why = hum(step), None if read else restless(step)
         why = _named(candidate, [each for each in (hums, restless_why) if each is not None])
         only_hums = hums is not None and restless_why is None
-        if why is None and raised_db is not None:
-            # A raised gain takes more torque in the same step; at its limit it shows nothing.
-            size = bearable(check, step, raised_db)
-            if size < 1.0 and len(steps) > 1 and bearable(check, steps[0], raised_db) >= 1.0:
-                settings_of_step, present, size = usual, steps[0], 1.0
-            if size < 1.0:
-                settings_of_step = replace(settings_of_step, size=size * settings_of_step.size)
-                present = await step_response(axis, session, settings_of_step, stepping, keep)
-            shown = await gain_steps(
-                axis, session, settings_of_step, present, raised_db, stepping,
-                facts=check.facts,
-                surely_db=surely_db(*known, verdicts),
-            )  # fmt: skip
+        if why is not None:
+            await steps.back()
+        elif raised_db is not None:
+            shown = await steps.with_raised_gain(raised_db, known.surely_db())
             verdict = _worst(_verdicts(axis, check, candidate, judged, shown.shown_db))
             why = _named(candidate, not_shown(verdict, guaranteed, shown, open_above))
     swept = replace(swept, margins=read)
@@ -240,6 +236,65 @@ async def verify(
         hum_percent_of(step) if step is not None and only_hums else None, every, verdict, share,
         shown,
     )  # fmt: skip
+
+
+@dataclass
+class _Steps:
+    """Steps of speed with the gains in force, each from where the first one began.
+
+    With ``stays`` the axis stays where the last one ended, until it has to be elsewhere: steps at a
+    raised gain are compared with one back as well, which then replaces a return.
+    """
+
+    axis: Axis
+    session: CyclicSession
+    check: Check
+    progress: Progress
+    keep: Keep | None
+    stays: bool
+    _done: list[tuple[step_evaluation.StepSettings, step_evaluation.StepResult]] = field(
+        default_factory=list
+    )
+    _begun_raw: int | None = None
+    """Where the axis has to return to, raw; None where it stands there."""
+
+    async def made(self, settings: step_evaluation.StepSettings) -> step_evaluation.StepResult:
+        """Make a step."""
+        await self.back()
+        if self.stays:
+            self._begun_raw = await self.axis.position_raw()
+        step = await step_response(
+            self.axis, self.session, settings, self.progress, self.keep, self.stays
+        )
+        self._done.append((settings, step))
+        return step
+
+    async def back(self) -> None:
+        """Return to where the steps begin."""
+        if self._begun_raw is not None:
+            begun, self._begun_raw = self._begun_raw, None
+            await go_back(self.axis, self.session, begun, self.check.envelope, self.check.facts)
+
+    async def with_raised_gain(self, raised_db: float, surely_db: float) -> GainSteps:
+        """Raise the gain with the last step, or with a smaller one that the torque limit permits.
+
+        A raised gain takes more torque in the same step; at the limit it shows nothing.
+        """
+        settings, present = self._done[-1]
+        size = bearable(self.check, present, raised_db)
+        if size < 1.0:
+            await self.back()
+            usual, before = self._done[0]
+            if len(self._done) > 1 and bearable(self.check, before, raised_db) >= 1.0:
+                settings, present = usual, before
+            else:
+                settings = replace(settings, size=size * settings.size)
+                present = await self.made(settings)
+        begun, self._begun_raw = self._begun_raw, None
+        return await gain_steps(
+            self.axis, self.session, settings, present, raised_db, self.progress,
+            facts=self.check.facts, surely_db=surely_db, begun_raw=begun,
+        )  # fmt: skip
 
 
 def _worst(verdicts: Sequence[LoopVerdict]) -> LoopVerdict | None:
