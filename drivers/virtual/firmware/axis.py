@@ -18,7 +18,7 @@ from drivers.virtual.firmware.objects.settings import (
     MotorData,
     ProtectionSettings,
 )
-from drivers.virtual.firmware.rough_torque import write_rough_torque
+from drivers.virtual.firmware.rough.rough_torque import write_rough_torque
 from drivers.virtual.mechanics import MechanicsSpec
 from drivers.virtual.mechanics.chain import FIRST_LOAD, discretise
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.cia402.base import FaultInfo
+from drivers.virtual.firmware.cia402.states import Command, State, decode, next_state
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.faults import Faults
+from drivers.virtual.firmware.failures.alarms import FaultLog
+from drivers.virtual.firmware.failures.faults import Faults
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.motion.brake import HoldingBrake
 from drivers.virtual.firmware.motion.identification import Identification
@@ -16,7 +17,6 @@ from drivers.virtual.firmware.motion.jog import TerminalJog
 from drivers.virtual.firmware.motion.modes import CST, PP, PT, Modes
 from drivers.virtual.firmware.motion.poles import PoleIdentification
 from drivers.virtual.firmware.motion.stopping import Stopping
-from drivers.virtual.firmware.states import Command, State, decode, next_state
 
 _HALT, _FAULT_RESET, _IDENTIFY = 1 << 8, 1 << 7, 1 << 11
 _OPERATING: Final = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE)

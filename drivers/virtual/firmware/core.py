@@ -8,7 +8,7 @@ from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.cia402.base import RPM, Family, Units
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.objects.dictionary import Number, ObjectDictionary
-from drivers.virtual.firmware.rough_feedback import rough_units
+from drivers.virtual.firmware.rough.rough_feedback import rough_units
 from drivers.virtual.firmware.schedule import Schedule
 from profiles.schema import Profile
 

@@ -10,7 +10,7 @@ from drivers.texts.message import Unsuitable, text
 from drivers.virtual.device import Device
 from drivers.virtual.firmware import families
 from drivers.virtual.firmware.motion.load_encoder import without_load_encoder
-from drivers.virtual.firmware.rough_feedback import without_lacking
+from drivers.virtual.firmware.rough.rough_feedback import without_lacking
 from drivers.virtual.firmware.servo import VirtualServo
 from drivers.virtual.mechanics import MechanicsSpec, standard_mechanics
 from profiles.loader import load_profile

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from drivers.virtual.firmware.cia402.states import State
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
@@ -12,8 +13,7 @@ from drivers.virtual.firmware.motion.load_encoder import LoadEncoder
 from drivers.virtual.firmware.objects.dictionary import Number
 from drivers.virtual.firmware.objects.monitors import monitors
 from drivers.virtual.firmware.objects.panel import Panel
-from drivers.virtual.firmware.rough_feedback import position_value, speed_value
-from drivers.virtual.firmware.states import State
+from drivers.virtual.firmware.rough.rough_feedback import position_value, speed_value
 from drivers.virtual.firmware.terminals import Terminals
 
 _TURN_INCREMENTS = 65536

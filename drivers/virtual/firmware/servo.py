@@ -16,12 +16,13 @@ from drivers.virtual.device import (
     ProcessImage,
     SdoAbort,
 )
-from drivers.virtual.firmware.alarms import FaultLog
 from drivers.virtual.firmware.axis import VirtualAxis
 from drivers.virtual.firmware.cia402.base import Family
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
-from drivers.virtual.firmware.faults import Emergency
+from drivers.virtual.firmware.failures.alarms import FaultLog
+from drivers.virtual.firmware.failures.faults import Emergency
+from drivers.virtual.firmware.failures.trouble import make_trouble
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.live import live_values
 from drivers.virtual.firmware.motion.automatic import Automatic
@@ -33,7 +34,6 @@ from drivers.virtual.firmware.objects.process_data import InputImage, OutputImag
 from drivers.virtual.firmware.objects.registers import RegisterTable
 from drivers.virtual.firmware.objects.storage import Storage
 from drivers.virtual.firmware.terminals import Terminals
-from drivers.virtual.firmware.trouble import make_trouble
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 

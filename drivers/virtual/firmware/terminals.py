@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from drivers.virtual.firmware.cia402.states import State
 from drivers.virtual.firmware.cia402.terminals import (
     InputPin,
     InputUse,
@@ -14,7 +15,6 @@ from drivers.virtual.firmware.cia402.terminals import (
 from drivers.virtual.firmware.control import DeviceControl
 from drivers.virtual.firmware.core import Core
 from drivers.virtual.firmware.kernel import layout as k
-from drivers.virtual.firmware.states import State
 
 _LATCHES = ("60BA:00", "60BB:00", "60BC:00", "60BD:00")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.virtual.firmware.states import Command, State, decode, next_state
+from drivers.virtual.firmware.cia402.states import Command, State, decode, next_state
 from drivers.virtual.mechanics import FrictionSpec, MechanicsSpec, SupplySpec
 
 from .servo_bench import REV, TURN, Bench, rigid

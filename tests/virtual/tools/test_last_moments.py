@@ -20,7 +20,7 @@ from drivers.cia402 import State
 from drivers.errors import DriveError
 from drivers.link import Address, Trajectory
 from drivers.virtual.device import Device
-from drivers.virtual.firmware.states import State as FirmwareState
+from drivers.virtual.firmware.cia402.states import State as FirmwareState
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.rig import WIDE, mechanics, settings_of
 

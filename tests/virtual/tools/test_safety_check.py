@@ -14,7 +14,7 @@ import pytest
 from backend.axes.axis.restoring import RestoreFailed
 from backend.tools.watching.safety_check.run import TOOL, plan_of
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.virtual.firmware.states import State as Firmware
+from drivers.virtual.firmware.cia402.states import State as Firmware
 from tests.virtual.tools.direct import DirectBench, direct
 from tests.virtual.tools.set_ups.safety_check import (
     ASKED,

@@ -34,7 +34,7 @@ from drivers.virtual.firmware.cia402.terminals import TerminalTable
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.objects.dictionary import Number, ObjectDictionary
 from drivers.virtual.firmware.objects.settings import LoopSettings, MotorData, ProtectionSettings
-from drivers.virtual.firmware.rough_feedback import unit_values
+from drivers.virtual.firmware.rough.rough_feedback import unit_values
 from drivers.virtual.mechanics import MechanicsSpec
 from profiles.schema import Profile, Raw
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from drivers.virtual.firmware.alarms import Record
 from drivers.virtual.firmware.cia402.base import (
     RPM,
     Autosave,
@@ -34,12 +33,13 @@ from drivers.virtual.firmware.cia402.keys import (
 )
 from drivers.virtual.firmware.cia402.power import MAINS_V
 from drivers.virtual.firmware.cia402.standard import Cia402
+from drivers.virtual.firmware.cia402.states import State
 from drivers.virtual.firmware.cia402.terminals import Input, Logic, Output, TerminalTable
+from drivers.virtual.firmware.failures.alarms import Record
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
 from drivers.virtual.firmware.objects.monitors import Sources, Value
 from drivers.virtual.firmware.objects.settings import MotorData, ProtectionSettings
-from drivers.virtual.firmware.states import State
 from profiles.schema import Profile
 
 #: P08.09 (000:3399). The unit of the level of each condition is not printed: torque in %, speeds in

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from drivers.virtual.firmware.alarms import Record
 from drivers.virtual.firmware.cia402.base import (
     RPM,
     Autosave,
@@ -28,13 +27,14 @@ from drivers.virtual.firmware.cia402.keys import (
 )
 from drivers.virtual.firmware.cia402.power import I2T_S, MAINS_V
 from drivers.virtual.firmware.cia402.standard import Cia402
+from drivers.virtual.firmware.cia402.states import State
 from drivers.virtual.firmware.cia402.terminals import Input, Logic, Output, TerminalTable
 from drivers.virtual.firmware.control import DeviceControl
+from drivers.virtual.firmware.failures.alarms import Record
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.objects.dictionary import ObjectDictionary
 from drivers.virtual.firmware.objects.monitors import Sources, Value
 from drivers.virtual.firmware.objects.settings import MotorData, ProtectionSettings
-from drivers.virtual.firmware.states import State
 from profiles.schema import Profile, Raw
 
 #: P06.51 (002:10800); units of the levels are assumed as for the M6-L.

@@ -12,7 +12,7 @@ from backend.tools.watching.safety_check.result import SafetyResult
 from backend.tools.watching.safety_check.run import TOOL
 from backend.tools.watching.safety_check.settings import SafetySettings
 from drivers.cia402 import State
-from drivers.virtual.firmware.states import State as Firmware
+from drivers.virtual.firmware.cia402.states import State as Firmware
 from tests.virtual.tools.direct import DirectBench
 from tests.virtual.tools.rig import At, mechanics, silent
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
-from drivers.virtual.firmware.alarms import Alarms, FaultLog, Snapshot, snapshot_of
 from drivers.virtual.firmware.cia402.base import FaultInfo
+from drivers.virtual.firmware.cia402.states import State
 from drivers.virtual.firmware.core import Core
+from drivers.virtual.firmware.failures.alarms import Alarms, FaultLog, Snapshot, snapshot_of
 from drivers.virtual.firmware.kernel import layout as k
 from drivers.virtual.firmware.schedule import Timer
-from drivers.virtual.firmware.states import State
 from profiles.schema import Fault
 
 _LIMIT_SWITCHES = k.SIG_NEGATIVE | k.SIG_POSITIVE

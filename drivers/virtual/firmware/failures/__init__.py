@@ -1,0 +1,1 @@
+"""Faults, warnings and their reactions, and failures that a test causes on purpose."""

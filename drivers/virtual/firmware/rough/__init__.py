@@ -1,0 +1,1 @@
+"""The non-ideal drive: how it reports its motion, and the options of its torque."""
