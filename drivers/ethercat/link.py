@@ -22,11 +22,11 @@ from drivers.ethercat.bus import BUS
 from drivers.ethercat.doctor import evidence_of
 from drivers.ethercat.eeprom.access import EepromAccess
 from drivers.ethercat.exchange.segmentcyclic import EthercatCyclic
-from drivers.ethercat.process import firmware
 from drivers.ethercat.process.hostprocess import HostProcess
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.punctuality import Kept
-from drivers.ethercat.process.requested import AlRequests
+from drivers.ethercat.process.stations import firmware
+from drivers.ethercat.process.stations.requested import AlRequests
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, exchange_from, survey_from
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.listing import Item, fitted, object_of, read_list

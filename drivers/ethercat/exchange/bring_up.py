@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 
 from drivers.errors import NotAllowed, ProtocolError, Rejected
 from drivers.ethercat.process.protocol import Message
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.registers import read_again
 from drivers.ethercat.wire.steps import Steps, Write

@@ -16,7 +16,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import Snapshot, StationSetup
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.segment import Segment
-from drivers.ethercat.process.station import (
+from drivers.ethercat.process.stations.station import (
     STATE_TIMEOUT_S,
     Station,
     al_status,

@@ -16,7 +16,7 @@ from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import Snapshot, StationSetup
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.segment import IO_MAP_BYTES, InvalidMap, Segment
-from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.process.stations.station import Station, identify
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.lanes import Done, LaneName, Lanes
 from drivers.ethercat.wire.steps import Steps

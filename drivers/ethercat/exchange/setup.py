@@ -20,7 +20,7 @@ from drivers.ethercat.exchange.bring_up import (
     timeout_s,
 )
 from drivers.ethercat.exchange.mapping import Assigned, Entry, Pdo
-from drivers.ethercat.process.station import STATE_TIMEOUT_S, Station, change_state
+from drivers.ethercat.process.stations.station import STATE_TIMEOUT_S, Station, change_state
 from drivers.ethercat.wire import coe, sii
 from drivers.ethercat.wire.al_status import AlState
 from drivers.ethercat.wire.registers import TRIES, read_again

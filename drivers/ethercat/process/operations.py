@@ -15,16 +15,16 @@ from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, P
 from drivers.ethercat.exchange.cyclic import CyclicLoop
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import FoundInPart
-from drivers.ethercat.process import firmware
-from drivers.ethercat.process import station as transactions
-from drivers.ethercat.process.eeprom import EepromOperations
-from drivers.ethercat.process.examination import examine
 from drivers.ethercat.process.protocol import Message, error_to_wire
 from drivers.ethercat.process.punctuality import Check
-from drivers.ethercat.process.requested import refuse_op, request
-from drivers.ethercat.process.roster import Roster, Send
 from drivers.ethercat.process.segment import InvalidMap, Segment
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations import firmware
+from drivers.ethercat.process.stations import station as transactions
+from drivers.ethercat.process.stations.eeprom import EepromOperations
+from drivers.ethercat.process.stations.examination import examine
+from drivers.ethercat.process.stations.requested import refuse_op, request
+from drivers.ethercat.process.stations.roster import Roster, Send
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe, esc, reading, sii
 from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.frames import ROOM_BYTES

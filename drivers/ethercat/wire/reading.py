@@ -17,7 +17,7 @@ from drivers.errors import (
     ProtocolError,
     Rejected,
 )
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe, information
 from drivers.ethercat.wire.steps import Gap, Steps
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.process.requested import request
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.requested import request
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand
 

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from drivers.errors import Busy, DriveError
-from drivers.ethercat.process.eeprom import EepromOperations
-from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.process.stations.eeprom import EepromOperations
+from drivers.ethercat.process.stations.station import Station, identify
 from drivers.ethercat.wire.frames import Request
 from drivers.ethercat.wire.lanes import Lanes
 from drivers.ethercat.wire.steps import Read, Write

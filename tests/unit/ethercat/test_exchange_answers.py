@@ -12,7 +12,7 @@ from drivers.ethercat.exchange.cyclic import Image
 from drivers.ethercat.exchange.exchange import Exchange
 from drivers.ethercat.exchange.mapping import Assigned, Entry, Pdo
 from drivers.ethercat.exchange.setup import StationSetup
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.lanes import Done
 from drivers.motion.playback import AxisLoop
 

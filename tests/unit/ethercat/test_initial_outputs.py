@@ -6,7 +6,7 @@ import struct
 
 from drivers.ethercat.exchange.mapping import Entry
 from drivers.ethercat.exchange.setup import initial_outputs
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from tests.wire.ethercat_host import scripted
 from tests.wire.ethercat_host.scripted import ScriptedSlave
 

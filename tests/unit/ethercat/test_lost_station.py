@@ -8,7 +8,7 @@ from typing import Any
 from drivers.errors import LinkLost
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process.operations import Operations
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 
 
 class Host:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 
 from drivers.dictionary import EntryDescription, ObjectInfo
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.reading import enumerate_objects
 from tests.wire.ethercat_host import scripted
 from tests.wire.ethercat_host.scripted import ScriptedSlave

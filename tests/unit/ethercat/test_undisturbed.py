@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from drivers.errors import Busy, LinkLost
-from drivers.ethercat.process import roster as watched
 from drivers.ethercat.process.operations import Operations
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations import roster as watched
+from drivers.ethercat.process.stations.station import Station
 from tests.wire.ethercat_host.test_roster import Clock, ask, roster
 
 

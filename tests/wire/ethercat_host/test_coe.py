@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from drivers.errors import LinkLost, LinkTimeout, NotInUse, ProtocolError, Rejected
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe as sdo
 from drivers.ethercat.wire import information
 from drivers.ethercat.wire.reading import read_items

@@ -6,7 +6,12 @@ import pytest
 
 from drivers.errors import NotAllowed
 from drivers.ethercat.exchange.exchange import enter_op
-from drivers.ethercat.process.station import AL_CONTROL, AL_STATUS, STATE_TIMEOUT_S, Station
+from drivers.ethercat.process.stations.station import (
+    AL_CONTROL,
+    AL_STATUS,
+    STATE_TIMEOUT_S,
+    Station,
+)
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.steps import Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand

@@ -20,7 +20,7 @@ from drivers.ethercat.exchange.cyclic import percentile_us
 from drivers.ethercat.exchange.ring import RING_BYTES, SLOT, VALID, Ring
 from drivers.ethercat.exchange.samples import contiguous
 from drivers.ethercat.process import protocol
-from drivers.ethercat.process.station import Station, change_state, to_preop
+from drivers.ethercat.process.stations.station import Station, change_state, to_preop
 from drivers.ethercat.wire import esc, sii
 from drivers.ethercat.wire.al_status import AlState, al_status_text, state_name
 from drivers.ethercat.wire.frames import Request

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.process.stations.station import Station, identify
 from drivers.ethercat.wire.registers import read_again
 from drivers.ethercat.wire.steps import Pause, Read, Write
 from tests.wire.ethercat_host.by_hand import ByHand

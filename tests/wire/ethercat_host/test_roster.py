@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from drivers.errors import LinkLost
-from drivers.ethercat.process import roster as watched
-from drivers.ethercat.process.roster import Roster
+from drivers.ethercat.process.stations import roster as watched
+from drivers.ethercat.process.stations.roster import Roster
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.steps import Pause, Read, Steps, Write
 

@@ -12,7 +12,7 @@ import pytest
 
 from drivers import cia402
 from drivers.errors import DriveError, LinkTimeout, NotAllowed
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.frames import Request
 from drivers.ethercat.wire.lanes import GRACE_S, Lanes, Urgency

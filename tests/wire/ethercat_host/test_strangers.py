@@ -19,7 +19,7 @@ from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.exchange.mapping import Entry, Pdo, alone
 from drivers.ethercat.exchange.setup import FoundInPart, StationSetup, check_places
 from drivers.ethercat.link import EthercatLink
-from drivers.ethercat.process.station import Station, identify
+from drivers.ethercat.process.stations.station import Station, identify
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
 from drivers.texts.message import prose

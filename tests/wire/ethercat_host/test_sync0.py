@@ -10,7 +10,7 @@ import pytest
 from drivers.errors import LinkLost
 from drivers.ethercat.exchange.mapping import Pdo, alone
 from drivers.ethercat.exchange.setup import StationSetup, start_sync0
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.steps import Read, Step, Write
 
 CYCLE_NS = 250_000

@@ -31,7 +31,7 @@ from drivers.cia402 import State
 from drivers.computer import permissions
 from drivers.errors import DriveError, NotAllowed, OutOfRange
 from drivers.ethercat.link import EthercatLink, segment_of
-from drivers.ethercat.process import firmware
+from drivers.ethercat.process.stations import firmware
 from drivers.ethercat.process.survey import ExchangeFigures, Survey, SurveyedStation
 from drivers.ethercat.wire.al_status import AlState
 from drivers.texts import limits

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed
 from drivers.ethercat.eeprom.transfer import Report, read_image, write_image
 from drivers.ethercat.process.protocol import Message
-from drivers.ethercat.process.roster import Roster
-from drivers.ethercat.process.station import Station, answers, with_eeprom
+from drivers.ethercat.process.stations.roster import Roster
+from drivers.ethercat.process.stations.station import Station, answers, with_eeprom
 from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.lanes import Done, Lanes
 from drivers.ethercat.wire.steps import Steps

@@ -10,7 +10,7 @@ import struct
 from drivers.errors import DriveError
 from drivers.ethercat.exchange.setup import StationSetup
 from drivers.ethercat.process.protocol import Message
-from drivers.ethercat.process.station import Station, al_status
+from drivers.ethercat.process.stations.station import Station, al_status
 from drivers.ethercat.wire import coe
 from drivers.ethercat.wire.registers import read_again
 from drivers.ethercat.wire.steps import Steps

@@ -10,10 +10,10 @@ from drivers.errors import Busy, DriveError, LinkLost
 from drivers.ethercat.exchange.exchange import Exchange
 from drivers.ethercat.exchange.ring import Ring
 from drivers.ethercat.exchange.setup import restore_mailbox
-from drivers.ethercat.process import station as transactions
 from drivers.ethercat.process.protocol import Message
 from drivers.ethercat.process.segment import Segment
-from drivers.ethercat.process.station import Station
+from drivers.ethercat.process.stations import station as transactions
+from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.wire.lanes import Lanes
 from drivers.ethercat.wire.mailbox import Mailbox

@@ -12,7 +12,7 @@ from typing import Literal
 
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.exchange.setup import SYNC_MANAGERS, restore_mailbox
-from drivers.ethercat.process.station import (
+from drivers.ethercat.process.stations.station import (
     Station,
     change_state,
     identify,

@@ -11,7 +11,12 @@ from typing import Any
 
 from drivers.conformance.subject import AlAnswer
 from drivers.errors import LinkLost, NotAllowed
-from drivers.ethercat.process.station import AL_CONTROL, STATE_TIMEOUT_S, Station, al_status
+from drivers.ethercat.process.stations.station import (
+    AL_CONTROL,
+    STATE_TIMEOUT_S,
+    Station,
+    al_status,
+)
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState
 from drivers.ethercat.wire.steps import Pause, Steps, Write
 from drivers.link import Progress

@@ -1,0 +1,1 @@
+"""Stations of a segment in the host process: search, EEPROM, firmware, examination."""
