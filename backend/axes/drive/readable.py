@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from backend.axes.drive.batches import asked_in_batches
-from backend.axes.drive.change_marks import ChangeMarks
 from backend.axes.drive.exclusive import ExclusiveAccess
-from backend.axes.drive.listeners import DriveListeners
 from backend.axes.drive.motion_keys import command_keys, motion_keys
-from backend.axes.drive.pending_restore import PendingRestores
+from backend.axes.drive.notes.change_marks import ChangeMarks
+from backend.axes.drive.notes.listeners import DriveListeners
+from backend.axes.drive.notes.pending_restore import PendingRestores
 from backend.axes.drive.ports import Port, address_of, port_for, unreachable_why
 from backend.axes.drive.readings import Reading
 from backend.axes.drive.value_check import named

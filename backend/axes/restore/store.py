@@ -18,7 +18,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from backend.axes.drive.pending_restore import PendingRestore
+from backend.axes.drive.notes.pending_restore import PendingRestore
 from backend.axes.restore.identity import DriveIdentity
 from backend.axes.restore.process import lives, this_process
 from backend.foundation.store.files import StorageFailed, write_atomically

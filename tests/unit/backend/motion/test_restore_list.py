@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from backend.axes.drive.pending_restore import PendingRestore
+from backend.axes.drive.notes.pending_restore import PendingRestore
 from backend.axes.restore import store as store_module
 from backend.axes.restore.identity import DriveIdentity, identity_of
 from backend.axes.restore.process import lives, this_process
