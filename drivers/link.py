@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.cia402 import State
-from drivers.dictionary import Described
 from drivers.doctor.examined import Examines
 from drivers.errors import DriveError, NotAllowed
-from drivers.feedback import FeedbackScale
 from drivers.halt import LoopState
+from drivers.objects.dictionary import Described
+from drivers.objects.feedback import FeedbackScale
 from drivers.texts.message import Text, text
 from profiles.schema import DataType, LinkKind, Profile
 

@@ -20,9 +20,9 @@ from drivers.canopen.nodes import NodeRecord, NodeWatch
 from drivers.canopen.sdo.channel import SdoChannel
 from drivers.canopen.sdo.scanning import probe
 from drivers.canopen.url import CanUrl
-from drivers.dialect import dialect_of
 from drivers.doctor.can_evidence import BusFacts, CanEvidence
 from drivers.errors import DriveError, LinkLost, LinkTimeout, Rejected
+from drivers.objects.dialect import dialect_of
 from profiles.schema import Profile
 
 _RECENT_S = 10.0

@@ -34,9 +34,6 @@ from drivers.canopen.sdo.channel import SdoChannel
 from drivers.canopen.sdo.scanning import identify, probe
 from drivers.canopen.url import CanUrl, parse_canopen_url
 from drivers.cia402 import is_stop
-from drivers.codec import size_of
-from drivers.dialect import dialect_of
-from drivers.dictionary import Described
 from drivers.doctor.can_diagnosis import diagnose
 from drivers.doctor.examined import Examination
 from drivers.errors import DriveError, LinkLost, NotAllowed, NotAsked
@@ -52,6 +49,9 @@ from drivers.link import (
     lists_nothing,
     notify,
 )
+from drivers.objects.codec import size_of
+from drivers.objects.dialect import dialect_of
+from drivers.objects.dictionary import Described
 from drivers.texts.message import Text, text
 from profiles.schema import LinkKind, Profile
 

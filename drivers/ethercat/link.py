@@ -13,7 +13,6 @@ from typing import Any
 from drivers import cia402
 from drivers.computer import permissions
 from drivers.computer.network.sockets import RAW_FRAMES
-from drivers.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.doctor.diagnosis import Cause, diagnose
 from drivers.doctor.evidence import Evidence
 from drivers.doctor.examined import Examination
@@ -42,6 +41,7 @@ from drivers.link import (
     Unsubscribe,
     notify,
 )
+from drivers.objects.dictionary import Described, EntryDescription, ObjectInfo
 from drivers.texts.message import Text, prose, text
 from profiles.schema import LinkKind, Profile
 

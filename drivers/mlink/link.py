@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from drivers.codec import serial_or_none
 from drivers.errors import NotAllowed
 from drivers.link import Address, Found
 from drivers.modbus.layout import BlockLimits
 from drivers.modbus.link import RegisterLink
 from drivers.modbus.port import LineSettings
 from drivers.modbus.registers import Place, words_of
+from drivers.objects.codec import serial_or_none
 from drivers.texts.message import Text, text
 from profiles.schema import DataType, LinkKind, Profile
 

@@ -15,7 +15,6 @@ from functools import partial
 from typing import TypeVar
 
 from drivers.cia402 import is_stop
-from drivers.dictionary import Described
 from drivers.doctor.examined import Examines
 from drivers.errors import (
     DriveError,
@@ -48,6 +47,7 @@ from drivers.modbus.registers import (
     to_words,
 )
 from drivers.modbus.thread import BusThread
+from drivers.objects.dictionary import Described
 from drivers.texts.message import Text, text
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind, Profile

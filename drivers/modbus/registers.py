@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from drivers.codec import size_of
 from drivers.errors import NotAllowed, ProtocolError
+from drivers.objects.codec import size_of
 from profiles.schema import DataType
 
 WordOrder = Literal["low_first", "high_first"]

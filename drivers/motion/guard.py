@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from drivers.feedback import (
+from drivers.halt import HaltCause, Halted
+from drivers.objects.feedback import (
     LIMIT_MARGIN,
     WINDOW_S,
     Contradiction,
     FeedbackScale,
     FeedbackWatch,
 )
-from drivers.halt import HaltCause, Halted
 
 
 class SpeedGuard:

@@ -10,7 +10,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.errors import NotAllowed
-from drivers.feedback import FeedbackScale
+from drivers.objects.feedback import FeedbackScale
 from drivers.texts.message import Text, text
 
 #: The CiA 402-2 objects that a motion commands and monitors.

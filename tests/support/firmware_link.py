@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drivers.codec import size_of
 from drivers.errors import DriveError, Rejected
 from drivers.link import Address, Found, LinkEvent, LinkQuality, Progress, Unsubscribe
 from drivers.modbus.registers import Place, to_bytes, to_words
+from drivers.objects.codec import size_of
 from drivers.texts.message import Text
 from drivers.urls import bus_kind
 from drivers.virtual.device import SdoAbort

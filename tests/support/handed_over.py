@@ -12,9 +12,9 @@ from backend.axes.motion.classes import motion_of
 from backend.axes.parameters.set_file import ParameterSet, dump, parse, storable
 from backend.records.handover.listed import ControllerList
 from backend.records.handover.model import is_lock
-from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
 from drivers.link import Found
+from drivers.objects.codec import decode, encode, size_of
 from drivers.virtual.device import Device, SdoAbort
 from drivers.virtual.firmware.factory import make_device
 from profiles import load_profile

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from drivers.dictionary import Described
 from drivers.errors import DriveError, Rejected
 from drivers.link import (
     Address,
@@ -17,6 +16,7 @@ from drivers.link import (
     Unsubscribe,
     lists_nothing,
 )
+from drivers.objects.dictionary import Described
 from drivers.texts.message import Text
 from drivers.urls import bus_kind
 from profiles.schema import LinkKind, Profile

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from backend.station.bench import Bench
 from backend.station.drives.connected_drive import ConnectedDrive
-from drivers.codec import size_of
 from drivers.errors import DriveError, LinkTimeout
 from drivers.link import Address
+from drivers.objects.codec import size_of
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
 

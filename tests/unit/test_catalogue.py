@@ -24,7 +24,7 @@ LANGUAGES: tuple[Language, ...] = ("en", "zh")
 #: Codes made of a room and a number: tables of the standards.
 TABLES = {
     "al-status.x": ROOT / "drivers/ethercat/wire/al_status.py",
-    "sdo-abort.x": ROOT / "drivers/sdo_abort.py",
+    "sdo-abort.x": ROOT / "drivers/objects/sdo_abort.py",
     "ethercat.foe-": ROOT / "drivers/ethercat/wire/foe.py",
 }
 #: Codes that are put together from parts.

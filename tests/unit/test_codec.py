@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from drivers.codec import decode, encode
 from drivers.errors import OutOfRange
+from drivers.objects.codec import decode, encode
 from profiles.schema import DataType, Raw
 
 

@@ -26,10 +26,10 @@ from backend.axes.motion.stopping import stops
 from backend.foundation.people.identity import arrived_s
 from drivers import cia402
 from drivers.cia402 import Mode, State
-from drivers.codec import encode
-from drivers.dialect import dialect_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError
 from drivers.link import OwnsPowerState
+from drivers.objects.codec import encode
+from drivers.objects.dialect import dialect_of
 from drivers.texts.message import Text, joined, text
 from drivers.texts.modes import mode_text
 from drivers.texts.states import state_text

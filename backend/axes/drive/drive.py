@@ -19,13 +19,13 @@ from backend.axes.motion.classes import held_still, motion_of
 from backend.axes.motion.grant import Grant
 from backend.axes.motion.stopping import stops
 from drivers import cia402
-from drivers.codec import encode
 from drivers.errors import (
     DriveError,
     LinkTimeout,
     NotAllowed,
     OutOfRange,
 )
+from drivers.objects.codec import encode
 from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Raw
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from backend.axes.drive.drive import Drive
-from drivers.codec import serial_or_none
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address
+from drivers.objects.codec import serial_or_none
 from drivers.texts.message import text
 
 

@@ -16,7 +16,6 @@ from backend.axes.drive.readings import Reading
 from backend.axes.drive.value_check import named
 from backend.axes.motion.authority import MotionAuthority
 from drivers import cia402
-from drivers.codec import decode
 from drivers.errors import (
     DriveError,
     NotAllowed,
@@ -24,6 +23,7 @@ from drivers.errors import (
     OutOfRange,
 )
 from drivers.link import Found, LinkQuality
+from drivers.objects.codec import decode
 from drivers.texts.message import Text, text
 from profiles.schema import Parameter, Profile
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from drivers.codec import encode
 from drivers.errors import DriveError, NotAllowed, OutOfRange
+from drivers.objects.codec import encode
 from drivers.texts.message import Text, joined, profile_text, text
 from profiles.schema import Parameter, Raw
 

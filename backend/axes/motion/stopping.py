@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.cia402 import CHANGE_IMMEDIATELY, FAULT_RESET, HALT, QUICK_STOP
-from drivers.dialect import dialect_of
+from drivers.objects.dialect import dialect_of
 from profiles.schema import Parameter, Profile, Raw
 
 #: Bit 3 of the control word: without it the motor has no power (CiA 402-2 table 29). The family

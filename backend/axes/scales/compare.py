@@ -1,8 +1,8 @@
 """Check whether 606Ch and 6064h of a whole recording report the same motion.
 
-The loop supervises them while the axis moves (`drivers.feedback`) and must decide at once. The
-check of a recording also covers low speeds and reciprocating motion, and comes before any result
-is computed from 606Ch.
+The loop supervises them while the axis moves (`drivers.objects.feedback`) and must decide at once.
+The check of a recording also covers low speeds and reciprocating motion, and comes before any
+result is computed from 606Ch.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from drivers.feedback import FeedbackScale, disagreement
 from drivers.halt import HaltCause, Halted
+from drivers.objects.feedback import FeedbackScale, disagreement
 
 FloatArray = npt.NDArray[np.float64]
 

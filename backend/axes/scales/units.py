@@ -15,7 +15,7 @@ from backend.axes.scales.resolve import by_text, origin_of, read_reported, scale
 from backend.axes.scales.scale import Origin, Quantity, Scale, Scales, ScaleUnknown, Uncertainty
 from backend.axes.scales.taught import Taught
 from drivers.errors import NotAllowed, OutOfRange
-from drivers.feedback import FeedbackScale
+from drivers.objects.feedback import FeedbackScale
 from drivers.texts import limits
 from profiles.schema import Parameter, UnitSpec
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from backend.axes.scales.units import AxisUnits
-from drivers.feedback import Disagreement, disagreement
 from drivers.halt import ENVELOPE_CAUSES, HaltCause, Halted, quantity_key
+from drivers.objects.feedback import Disagreement, disagreement
 from drivers.texts.message import Text, text
 
 _MEANING = {

@@ -18,8 +18,8 @@ from backend.records.handover.model import (
     rank,
     write_of,
 )
-from drivers.codec import decode, encode, size_of
 from drivers.errors import DriveError
+from drivers.objects.codec import decode, encode, size_of
 from drivers.texts.message import Param, Text, text
 from profiles.schema import Parameter, Profile, Raw
 

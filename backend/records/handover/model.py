@@ -11,8 +11,8 @@ from typing import Literal
 
 from backend.axes.motion.classes import motion_of
 from backend.axes.parameters.set_file import ParameterSet
-from drivers.codec import encode, size_of
 from drivers.errors import DriveError, NotAllowed
+from drivers.objects.codec import encode, size_of
 from drivers.texts.message import Text, joined, prose, text
 from profiles.importer.esi.controller import SlaveController
 from profiles.schema import DataType, Parameter, Profile, Raw

@@ -31,8 +31,8 @@ from backend.records.handover.listed import (
     number,
     row_of_bytes,
 )
-from drivers.codec import encode, size_of
 from drivers.errors import DriveError
+from drivers.objects.codec import encode, size_of
 from drivers.texts.imports import failure_text
 from drivers.texts.message import Text, prose, text
 from profiles.importer import (

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from backend.foundation.work.child import run_child
-from drivers.dictionary import Described, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found, Link, Progress
+from drivers.objects.dictionary import Described, ObjectInfo
 from drivers.texts.imports import message_of_import
 from profiles.importer import (
     ImportedProfile,

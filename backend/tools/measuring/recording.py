@@ -34,7 +34,7 @@ from backend.tools.thresholds import measuring_recording as threshold
 from drivers import link as bus
 from drivers.cia402 import Mode
 from drivers.errors import LinkLost, LinkTimeout, NotAllowed
-from drivers.feedback import FeedbackScale
+from drivers.objects.feedback import FeedbackScale
 from drivers.texts.message import Text
 
 ROLES = ("position_actual", "velocity_actual", "torque_actual", "status_word")

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drivers.canopen.frames import RPDO, TPDO
-from drivers.codec import size_of
 from drivers.link import Address, CyclicSignal
+from drivers.objects.codec import size_of
 from profiles.schema import PdoSet, Profile
 
 Direction = Literal["rx", "tx"]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from drivers import cia402
 from drivers.canopen.exchange.pdo import PdoPlan
-from drivers.codec import decode, encode, size_of
 from drivers.halt import Halted
 from drivers.motion.playback import AxisLoop
+from drivers.objects.codec import decode, encode, size_of
 from drivers.texts.message import Text
 from profiles.schema import INTEGER_RANGE, DataType
 

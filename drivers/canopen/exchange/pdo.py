@@ -14,8 +14,8 @@ from typing import Literal
 from drivers.canopen.exchange.busload import LIMIT, BusLoad, bus_load, require_room
 from drivers.canopen.exchange.fixed_pdo import FixedPdo, chosen
 from drivers.canopen.frames import RPDO, TPDO
-from drivers.codec import size_of
 from drivers.link import CyclicSignal
+from drivers.objects.codec import size_of
 from drivers.texts.message import Text, text
 
 MAX_ENTRIES = 4

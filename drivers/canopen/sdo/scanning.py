@@ -6,9 +6,9 @@ import time
 from collections.abc import Sequence
 
 from drivers.canopen.sdo.channel import SdoChannel
-from drivers.codec import serial_or_none, text_of
 from drivers.errors import DriveError, LinkLost
 from drivers.link import Found
+from drivers.objects.codec import serial_or_none, text_of
 from drivers.texts.message import Text, text
 
 _WINDOW_S = 0.12

@@ -13,7 +13,7 @@ from collections.abc import Generator
 from typing import NamedTuple, TypeVar
 
 from drivers.errors import ProtocolError, Rejected
-from drivers.sdo_abort import rejected
+from drivers.objects.sdo_abort import rejected
 from drivers.texts.message import Text, text
 
 T = TypeVar("T")

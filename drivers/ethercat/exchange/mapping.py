@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.codec import size_of
 from drivers.errors import NotAllowed
 from drivers.ethercat.exchange.assignment import (
     AssignmentRules,
@@ -19,6 +18,7 @@ from drivers.ethercat.exchange.assignment import (
 )
 from drivers.link import Address, CyclicSignal
 from drivers.motion.setpoints import TARGETS
+from drivers.objects.codec import size_of
 from drivers.texts import limits
 from drivers.texts.message import Text, joined, text
 from profiles.schema import Parameter, PdoPart, PdoSet, Profile

@@ -10,7 +10,6 @@ from typing import Any
 from drivers import cia402
 from drivers.cia402 import State
 from drivers.computer.timing.realtime import RealTime
-from drivers.dictionary import ObjectInfo
 from drivers.errors import Busy, DriveError, LinkLost, NotAllowed, OutOfRange, ProtocolError
 from drivers.ethercat.exchange.cyclic import CyclicLoop
 from drivers.ethercat.exchange.ring import Ring
@@ -30,6 +29,7 @@ from drivers.ethercat.wire.al_status import AlState, state_name
 from drivers.ethercat.wire.frames import ROOM_BYTES
 from drivers.ethercat.wire.lanes import Done, Lanes, Urgency
 from drivers.halt import HaltCause, Halted
+from drivers.objects.dictionary import ObjectInfo
 from drivers.texts.message import Text, text
 
 _CONTROL_WORD = (0x6040, 0)

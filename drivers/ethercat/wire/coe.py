@@ -14,7 +14,7 @@ from typing import NoReturn
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
 from drivers.ethercat.wire.steps import Pause, Steps
-from drivers.sdo_abort import rejected
+from drivers.objects.sdo_abort import rejected
 from drivers.texts.message import Text, text
 
 _REQUEST = 2 << 12

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import struct
 
-from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import ProtocolError
 from drivers.ethercat.wire.coe import MAX_BYTES, OVERTAKEN_READS, settle
 from drivers.ethercat.wire.mailbox import COE, Mail, Mailbox, Overtaken
 from drivers.ethercat.wire.registers import GONE_S
 from drivers.ethercat.wire.steps import Steps
-from drivers.sdo_abort import rejected
+from drivers.objects.dictionary import EntryDescription, ObjectInfo
+from drivers.objects.sdo_abort import rejected
 
 _INFO = 8
 

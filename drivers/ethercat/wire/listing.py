@@ -7,10 +7,10 @@ import itertools
 from collections.abc import Awaitable, Callable, Sequence
 from typing import TypeAlias
 
-from drivers.codec import size_of
 from drivers.errors import DriveError, LinkTimeout, NotAllowed, NotAsked, ProtocolError
 from drivers.ethercat.process.protocol import Message, error_from_wire
 from drivers.link import Address
+from drivers.objects.codec import size_of
 
 Item: TypeAlias = tuple[int, int, int | None]
 """Index, subindex, and size in bytes if known."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from drivers.dictionary import Described
 from drivers.errors import (
     DriveError,
     LinkLost,
@@ -20,6 +19,7 @@ from drivers.errors import (
 from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire import coe, information
 from drivers.ethercat.wire.steps import Gap, Steps
+from drivers.objects.dictionary import Described
 
 _NO_COMPLETE_ACCESS = {0x05040001, 0x06010000, 0x06010004}
 _LISTS = frozenset((*range(0x1600, 0x1C00), *range(0x1C10, 0x1C30)))

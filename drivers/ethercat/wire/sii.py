@@ -13,10 +13,10 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.codec import serial_or_none
 from drivers.errors import DriveError, LinkLost, LinkTimeout, ProtocolError
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Steps, Write
+from drivers.objects.codec import serial_or_none
 
 ALIAS_WORD, CHECKSUM_WORD, SERIAL_WORD, BOOT_WORD = 0x0004, 0x0007, 0x000E, 0x0014
 MAILBOX_WORD = 0x0018

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from drivers.codec import size_of
 from drivers.computer.timing.scheduling import fine_timers
 from drivers.errors import NotAllowed
 from drivers.mlink.link import register_of
@@ -25,6 +24,7 @@ from drivers.modbus.framing import (
     write_response,
 )
 from drivers.modbus.registers import Place, to_bytes, to_words
+from drivers.objects.codec import size_of
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,

@@ -16,8 +16,8 @@ import httpx
 
 from backend.records.handover.files import FORMATS, Format, files_of, fitting
 from backend.records.handover.model import AxisHandover, hand_over
-from drivers.codec import decode, encode
 from drivers.errors import NotAllowed
+from drivers.objects.codec import decode, encode
 from drivers.virtual.device import Device
 from drivers.virtual.firmware.factory import make_device
 from profiles.schema import Raw

@@ -15,7 +15,7 @@ from drivers.conformance.rule import Verdict
 from drivers.conformance.subject import AlAnswer, Subject
 from drivers.errors import Busy, LinkTimeout, NotAllowed
 from drivers.link import Address, Found
-from drivers.sdo_abort import rejected
+from drivers.objects.sdo_abort import rejected
 from drivers.texts.message import language, speaking
 
 NO_OBJECT, NO_SUBINDEX, READ_ONLY, TOO_LONG, TOO_SHORT = (

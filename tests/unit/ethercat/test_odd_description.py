@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import struct
 
-from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.ethercat.process.stations.station import Station
 from drivers.ethercat.wire.reading import enumerate_objects
+from drivers.objects.dictionary import EntryDescription, ObjectInfo
 from tests.wire.ethercat_host import scripted
 from tests.wire.ethercat_host.scripted import ScriptedSlave
 

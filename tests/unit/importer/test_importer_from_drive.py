@@ -8,9 +8,9 @@ import pytest
 from importer_samples import GOOD_EDS
 
 from backend.station.drives.description import dictionary_entries, profile_of_drive
-from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import NotAllowed, Rejected
 from drivers.link import Address, Found
+from drivers.objects.dictionary import EntryDescription, ObjectInfo
 from drivers.urls import bus_kind
 from profiles.importer import ImportFailed
 

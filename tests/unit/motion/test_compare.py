@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 
 from backend.axes.scales.compare import disagreement_of, measured_scale
-from drivers.feedback import Disagreement, FeedbackScale
 from drivers.halt import HaltCause
+from drivers.objects.feedback import Disagreement, FeedbackScale
 
 COUNTS, CYCLE_S = 65_536, 1e-3
 RPM = COUNTS / 60.0

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.feedback import Disagreement, FeedbackScale
 from drivers.halt import HaltCause, Halted
 from drivers.motion.guard import SpeedGuard
+from drivers.objects.feedback import Disagreement, FeedbackScale
 
 COUNTS, CYCLE_S = 10_000, 1e-3
 RPM = COUNTS / 60.0

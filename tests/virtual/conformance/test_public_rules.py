@@ -10,7 +10,7 @@ from drivers.conformance.check import check
 from drivers.conformance.rule import Verdict
 from drivers.conformance.subject import AlAnswer, Subject
 from drivers.link import Address
-from drivers.sdo_abort import rejected
+from drivers.objects.sdo_abort import rejected
 from profiles.schema import LinkKind
 
 from .on_wire import EVERY, Aborted, CanWire, EthercatWire, OnWire

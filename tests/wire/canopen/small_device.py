@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from drivers.codec import decode, encode, size_of
+from drivers.objects.codec import decode, encode, size_of
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,

@@ -10,11 +10,11 @@ import pytest
 
 from drivers import cia402
 from drivers.cia402 import State
-from drivers.dialect import dialect_of
 from drivers.errors import NotAllowed
 from drivers.halt import HaltCause, Halted
 from drivers.motion.playback import AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
+from drivers.objects.dialect import dialect_of
 from profiles.loader import load_profile
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from drivers.canopen.sdo import transfers as sdo
 from drivers.canopen.sdo.channel import SdoChannel
 from drivers.errors import LinkTimeout, ProtocolError, Rejected
-from drivers.sdo_abort import abort_text, rejected
+from drivers.objects.sdo_abort import abort_text, rejected
 from drivers.virtual.device import SdoAbort
 from drivers.virtual.wires.sdo_server import SdoServer
 

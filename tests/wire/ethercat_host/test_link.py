@@ -13,11 +13,11 @@ import time
 
 import pytest
 
-from drivers.dictionary import EntryDescription
 from drivers.errors import Busy, DriveError, LinkLost, LinkTimeout, NotAllowed, Rejected
 from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.wire.al_status import AlState
 from drivers.link import Address
+from drivers.objects.dictionary import EntryDescription
 from drivers.texts.message import prose, text
 from drivers.virtual.wires.netns import Namespace, child_environment
 from tests.support.machine import OwnTime

@@ -9,10 +9,10 @@ import pytest
 
 from drivers.cia402 import State
 from drivers.errors import NotAllowed
-from drivers.feedback import FeedbackScale
 from drivers.halt import HaltCause, Halted, LeftBy
 from drivers.motion.playback import LET_GO_S, RUNS_ON_S, STOP_S, AxisLoop
 from drivers.motion.setpoint_plan import Limits, Motion, Phase
+from drivers.objects.feedback import FeedbackScale
 
 IN = {0x6041: 0, 0x6064: 1, 0x606C: 2, 0x6077: 3, 0x6061: 4}
 OUT = {0x6040: 0, 0x607A: 1, 0x60FF: 2, 0x6071: 3, 0x60B2: 4, 0x6060: 5}

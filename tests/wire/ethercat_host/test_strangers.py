@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from drivers.cia402 import Mode, State
-from drivers.dictionary import EntryDescription, ObjectInfo
 from drivers.errors import DriveError, LinkLost, NotAllowed, Rejected
 from drivers.ethercat.exchange.mapping import Entry, Pdo, alone
 from drivers.ethercat.exchange.setup import FoundInPart, StationSetup, check_places
@@ -22,6 +21,7 @@ from drivers.ethercat.link import EthercatLink
 from drivers.ethercat.process.stations.station import Station, identify
 from drivers.ethercat.wire.steps import Read, Steps, Write
 from drivers.link import Address, CyclicSignal, Envelope, Trajectory
+from drivers.objects.dictionary import EntryDescription, ObjectInfo
 from drivers.texts.message import prose
 from drivers.virtual.wires.netns import Namespace
 from profiles.schema import PdoSet, PdoSpec, Profile

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
-from drivers.codec import size_of
+from drivers.objects.codec import size_of
 from drivers.virtual.device import (
     ABORT_LENGTH,
     ABORT_NO_OBJECT,

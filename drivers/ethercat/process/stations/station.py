@@ -6,13 +6,13 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from drivers.codec import serial_or_none, text_of
 from drivers.errors import DriveError, LinkLost, LinkTimeout, NotAllowed, ProtocolError, Rejected
 from drivers.ethercat.wire import coe, esc, sii
 from drivers.ethercat.wire.al_status import ERROR_BIT, AlState, al_status_text, state_name
 from drivers.ethercat.wire.mailbox import Mailbox
 from drivers.ethercat.wire.registers import GONE_S, TRIES, read_again
 from drivers.ethercat.wire.steps import Pause, Read, Steps, T, Write
+from drivers.objects.codec import serial_or_none, text_of
 from drivers.texts.message import Text, text
 
 AL_CONTROL, AL_STATUS = 0x120, 0x130

@@ -10,8 +10,8 @@ from backend.axes.drive.drive import Drive
 from backend.axes.drive.ports import Port
 from backend.axes.parameters.set_file import storable
 from backend.station.drives.second_port import missing_ports, require_same_drive
-from drivers.codec import encode
 from drivers.errors import NotAllowed
+from drivers.objects.codec import encode
 from profiles import load_profile
 from tests.support.memory_link import MemoryLink
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import struct
 
-from drivers.codec import encode
 from drivers.errors import OutOfRange
+from drivers.objects.codec import encode
 from drivers.virtual.device import ABORT_UNSUPPORTED, EntryInfo, SdoAbort
 from drivers.virtual.wires.ethercat.mailbox.dictionary import CoeDictionary
 from profiles.schema import DataType, Parameter
