@@ -88,14 +88,9 @@ def words_in_messages(terms: Sequence[Term]) -> Iterator[Finding]:
 
 
 def words_on_page(terms: Sequence[Term]) -> Iterator[Finding]:
-    """Banned words in the texts of the page; English and Chinese stand in one file.
-
-    ``said*.ts`` are left out: they are patterns of the server's sentences, not texts of the page.
-    """
+    """Banned words in the texts of the page; English and Chinese stand in one file."""
     rules = [*banned(terms, chinese=False), *banned(terms, chinese=True)]
-    for file in sorted(PAGE_TEXTS.glob("*.ts")):
-        if file.name.startswith("said"):
-            continue
+    for file in sorted(PAGE_TEXTS.rglob("*.ts")):
         lines = (
             Line(number, re.sub(r"^\s*(//|/?\*).*|^\s*'[^']+':", "", line))
             for number, line in enumerate(file.read_text("utf-8").splitlines(), 1)
@@ -153,9 +148,7 @@ def long_texts() -> Iterator[Finding]:
         for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
             text = re.sub(r"^\s*[\w.-]+ = ", "", re.sub(r"\{[^{}]*\}", "X", line))
             yield from _long(file, number, _split(text))
-    for file in sorted(PAGE_TEXTS.glob("*.ts")):
-        if file.name.startswith("said"):
-            continue
+    for file in sorted(PAGE_TEXTS.rglob("*.ts")):
         for number, line in enumerate(file.read_text("utf-8").splitlines(), 1):
             for single, double in re.findall(r"'((?:[^'\\]|\\.)*)'|\"([^\"]*)\"", line):
                 yield from _long(file, number, _split(single or double))

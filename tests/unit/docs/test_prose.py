@@ -78,8 +78,8 @@ def test_banned_words_in_messages_and_on_the_page(
         "a_set-point = ok\nb_c = the set-point { $set-point }\n", "utf-8"
     )
     (pages / "x.zh.ftl").write_text("b_c = 共振\n", "utf-8")
-    (pages / "x.ts").write_text("  'bit.set-point': ['setpoint', '共振'],\n", "utf-8")
-    (pages / "said.ts").write_text("  'said.x': ['set-point', '共振'],\n", "utf-8")
+    (pages / "axis").mkdir()
+    (pages / "axis/x.ts").write_text("  'bit.set-point': ['setpoint', '共振'],\n", "utf-8")
     assert [(one.file.name, one.line) for one in prose.words_in_messages(terms.load())] == [
         ("x.en.ftl", 2),
         ("x.zh.ftl", 1),
@@ -116,7 +116,8 @@ def test_long_sentences(prose: ModuleType, pages: Path, words: int, count: int) 
     sentence = " ".join(["word"] * words)
     (pages / "page.md").write_text(f"Short.\n\n- {sentence}.\n  Next.\n", "utf-8")
     (pages / "x.en.ftl").write_text(f"a_b = {sentence}\n", "utf-8")
-    (pages / "x.ts").write_text(f"  'a.b': ['{sentence}', '短'],\n", "utf-8")
+    (pages / "axis").mkdir()
+    (pages / "axis/x.ts").write_text(f"  'a.b': ['{sentence}', '短'],\n", "utf-8")
     assert len(list(prose.long_sentences())) == count
     assert len(list(prose.long_texts())) == 2 * count
 
@@ -134,3 +135,8 @@ def test_notes_of_chinese_pages_have_chinese_titles(prose: ModuleType, pages: Pa
         '!!! warning "警告：轴"\n    文字。\n\n!!! danger\n    文字。\n', "utf-8"
     )
     assert [(one.file.parent.name, one.line) for one in prose.english_titles()] == [("zh", 4)]
+
+
+def test_the_page_has_texts_where_they_are_looked_for(prose: ModuleType) -> None:
+    """A move of the files would otherwise end their checks unnoticed."""
+    assert len(list(prose.PAGE_TEXTS.rglob("*.ts"))) > 10
