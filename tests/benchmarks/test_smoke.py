@@ -22,7 +22,8 @@ MODULES = {m.name for m in pkgutil.iter_modules(benchmarks.__path__) if m.name[0
 class Smallest:
     """Arguments and numbers of the module with which it takes seconds.
 
-    ``long``: servers, browsers and buses in real time, which are left to the long suite.
+    ``long``: left to the long suite, for its servers, browsers and buses in real time, or as a test
+    of `make test` runs the same.
     """
 
     arguments: tuple[str, ...] = ()
@@ -43,7 +44,7 @@ SMALLEST = {
     "flight_recorder": Smallest(
         ("--pairs", "2", "--seconds", "0.5"), {"_SETTLE_S": 0.1}, long=True
     ),
-    "handover_table": Smallest(),
+    "handover_table": Smallest(long=True),
     "health_trend": Smallest((), {"AXES": 2, "RUNS": 5, "binaries": lambda: None}),
     "import_accuracy": Smallest(("--benches", "1")),
     "independent_slave": Smallest(),
@@ -53,14 +54,14 @@ SMALLEST = {
     "people_load": Smallest((), {"VIEWERS": 2, "ROUNDS": 1}, long=True),
     "profile_load": Smallest((), {"_RUNS": 1}),
     "recording": Smallest((), {"TURNS": 1, "SECONDS": 2, "ROUNDS": 1}),
-    "rough_campaign": Smallest(("--axes", "1", "--tune", "0")),
+    "rough_campaign": Smallest(("--axes", "1", "--tune", "0"), long=True),
     "scope_latency": Smallest((), {"SECONDS": 1.0, "PAGES": (0, 1)}, long=True),
     "scope_soak": Smallest((), {"SECONDS": 3.0, "BASELINE_S": 1.0}, long=True),
     "serial_throughput": Smallest((), {"SECONDS_EACH": 0.1, "SPEEDS": (("115200 baud", 115_200),)}),
     "station_rights": Smallest(("nowhere",)),
     "station_soak": Smallest((), {"SECONDS": 2.0}, long=True),
     "thresholds": Smallest(("--only", "nothing"), {"AXES": ((1, 1000.0),)}),
-    "tune_accuracy": Smallest(("--khz", "1", "--only", "motor alone", "--wire", "none")),
+    "tune_accuracy": Smallest(("--khz", "1", "--only", "motor alone", "--wire", "none"), long=True),
     "virtual_kernel": Smallest(("0.01",)),
 }
 

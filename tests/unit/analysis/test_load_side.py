@@ -68,6 +68,7 @@ def test_intervals_hold_the_truth_in_nine_of_ten_axes() -> None:
     assert np.mean(stiff) >= 0.9
 
 
+@pytest.mark.long
 def test_the_error_of_an_eccentric_encoder_is_seen_once_per_revolution() -> None:
     for case, found in campaign():
         if not found.whole_revolution:
@@ -77,7 +78,6 @@ def test_the_error_of_an_eccentric_encoder_is_seen_once_per_revolution() -> None
         assert first.value == pytest.approx(truth, abs=max(0.05 * truth, 2 * case.count_rad))
 
 
-@pytest.mark.long
 def test_friction_that_keeps_the_load_on_its_flank_hides_the_gap() -> None:
     case = drawn(3)
     heavy = replace(
@@ -94,7 +94,6 @@ def test_friction_that_keeps_the_load_on_its_flank_hides_the_gap() -> None:
     assert found.lost_motion_rad.value == pytest.approx(truth, rel=0.05)
 
 
-@pytest.mark.long
 def test_a_pull_that_holds_the_flank_leaves_both_open() -> None:
     case = drawn(4)
     hanging = replace(case.axis, pull=0.3 * case.rated_nm, gap_rad=5e-3, counts=2**18)

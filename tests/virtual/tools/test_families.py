@@ -95,7 +95,7 @@ async def test_inertia_between_ends_that_are_found() -> None:
         assert abs(units.position(await b.axis.position_raw())) < 0.05
 
 
-@pytest.mark.long(keep=1)
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["mms7", "m6l", "r6l", "el7"])
 async def test_autotune_of_a_family_and_back(drive: str) -> None:
     # M6-L does not report its motor's inertia, which its inertia ratio counts in.
