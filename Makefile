@@ -18,7 +18,7 @@ install: ## the virtual environment with the product in it
 run: install ## the demo bench of virtual drives in a browser page
 	$(BIN)/servodeck demo --open
 
-test: ready ## everything that CI checks; at most 15 minutes on two processors
+test: ready ## everything that CI checks; 15 to 19 minutes on two processors
 	$(BIN)/python tests/run_all.py
 
 test-long: ready ## every check with every test, those of `make test` among them; an hour
