@@ -20,8 +20,8 @@ from backend.tools.tuning.autotune.time_budget import TimeLeft
 from backend.tools.tuning.autotune.verification.verify import (
     HUM_PERCENT,
     Check,
-    Hums,
     Keep,
+    TorqueRipples,
     Verified,
     of_candidate,
     verify,
@@ -97,7 +97,7 @@ async def first_kept(
                 if await ends_all(axis, error):
                     raise
                 tried.append(of_candidate(candidate, error.text))
-                if not isinstance(error, Hums):
+                if not isinstance(error, TorqueRipples):
                     continue
                 share = _quieter_share(error.rms_percent)
             except BaseException:

@@ -17,7 +17,7 @@ from backend.analysis.loop.margins import Margins
 from backend.foundation.work.jobs import Progress
 from backend.tools.tuning.autotune import apply as tune_apply
 from backend.tools.tuning.autotune.time_budget import TimeLeft
-from backend.tools.tuning.autotune.verification.verify import Hums
+from backend.tools.tuning.autotune.verification.verify import TorqueRipples
 from drivers.cia402 import State
 from drivers.errors import OutOfRange
 from drivers.texts.message import Text, text
@@ -57,7 +57,7 @@ async def kept_of(
         hum = None if kept or shown_nms else 4.0 * gain / QUIET_NMS
         share = None if kept or not shown_nms else 0.84
         if hum and at_standstill:
-            raise Hums("autotune.hums", rms_percent=hum)
+            raise TorqueRipples(hum)
         return SimpleNamespace(
             kept=kept, why=None if kept else HUMS, hum_percent=hum, share_to_show=share
         )

@@ -28,7 +28,7 @@ from backend.tools.tuning.autotune.verification.verdict import (
 )
 from backend.tools.tuning.autotune.verification.verify import (
     Check,
-    Hums,
+    TorqueRipples,
     Verified,
     bearable,
     hum,
@@ -279,7 +279,7 @@ async def test_a_torque_that_oscillates_by_far_at_standstill_costs_no_response(
     """It was measured for 8 to 18 s before the step showed the same."""
     found, pairs = await verified_of(monkeypatch, 60.0, [loop_swept(1.0)], ripple_percent=7.0)
     assert (found.kept, pairs) == (True, [1])
-    with pytest.raises(Hums, match=r"8\.5 %") as raised:
+    with pytest.raises(TorqueRipples, match=r"8\.5 %") as raised:
         await verified_of(monkeypatch, 60.0, [], ripple_percent=8.5)
     assert raised.value.rms_percent == 8.5
 

@@ -58,13 +58,15 @@ LOOKS = threshold.LOOKS
 HUM_PERCENT = threshold.HUM_PERCENT
 
 
-class Hums(NotAllowed):
-    """The torque of the standing axis oscillates by far: no response need be measured for that."""
+class TorqueRipples(NotAllowed):
+    """The torque of the standing axis oscillates by far: no response need be measured for that.
 
-    @property
-    def rms_percent(self) -> float:
-        """RMS of the torque, in % of rated torque."""
-        return float(str(self.text.params["rms_percent"]))
+    ``rms_percent`` is the RMS of the torque, in % of rated torque.
+    """
+
+    def __init__(self, rms_percent: float) -> None:
+        super().__init__("autotune.hums", rms_percent=rms_percent)
+        self.rms_percent = rms_percent
 
 
 @dataclass(frozen=True)
@@ -135,14 +137,14 @@ async def verify(
     where the first pair shows too little, or another bandwidth than predicted.
 
     Raises:
-        Hums: the torque oscillates at standstill by far: nothing else was measured.
+        TorqueRipples: the torque oscillates at standstill by far: nothing else was measured.
         NotAllowed: the axis does not hold standstill, or the envelope or a fault ended it.
     """
     waiting, measuring, stepping = reported
     waiting(0.0, prose(""))
     ripple = (await standing(axis, session, check.facts)).ripple_percent
     if ripple > threshold.SURELY_HUMS * HUM_PERCENT:
-        raise Hums("autotune.hums", rms_percent=ripple)
+        raise TorqueRipples(ripple)
     if check.home_raw is not None:
         await quiet(axis)
         await go_back(axis, session, check.home_raw, check.envelope, check.facts)
